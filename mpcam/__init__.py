@@ -1,0 +1,82 @@
+"""Cameras that are not pinholes: model them, rasterize through them, and measure what each model costs and gains.
+
+Names load on first use: `import mpcam` alone loads NumPy and nothing heavier.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mpcam.cameras import Box as Box
+    from mpcam.cameras import Camera as Camera
+    from mpcam.cameras import Domain as Domain
+    from mpcam.cameras import Orthographic as Orthographic
+    from mpcam.cameras import Pinhole as Pinhole
+    from mpcam.cameras import Profile as Profile
+    from mpcam.cameras import Projection as Projection
+    from mpcam.cameras import Radial as Radial
+    from mpcam.cameras import Ray as Ray
+    from mpcam.cameras import custom_profile as custom_profile
+    from mpcam.cameras import look_at as look_at
+    from mpcam.comparison.driver import compare as compare
+    from mpcam.comparison.table import Comparison as Comparison
+    from mpcam.errors import InputError as InputError
+    from mpcam.errors import SetupError as SetupError
+    from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
+    from mpcam.geometry.builtin import builtin_scene as builtin_scene
+    from mpcam.geometry.load import load_mesh as load_mesh
+    from mpcam.geometry.mesh import Material as Material
+    from mpcam.geometry.mesh import Mesh as Mesh
+    from mpcam.geometry.scene import DirectionalLight as DirectionalLight
+    from mpcam.geometry.scene import PointLight as PointLight
+    from mpcam.geometry.scene import Scene as Scene
+    from mpcam.io.images import read_camera as read_camera
+    from mpcam.io.images import read_channels as read_channels
+    from mpcam.io.images import read_image as read_image
+    from mpcam.io.images import write_image as write_image
+    from mpcam.io.scenes import load_scene as load_scene
+    from mpcam.rendering.hits import Hits as Hits
+    from mpcam.rendering.interpolate import interpolate as interpolate
+    from mpcam.rendering.methods import prepare as prepare
+    from mpcam.rendering.methods import rasterize as rasterize
+    from mpcam.rendering.methods import render as render
+    from mpcam.rendering.shade import shade as shade
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "mpcam.cameras": (
+        "Box Camera Domain Orthographic Pinhole Profile Projection Radial Ray custom_profile look_at"
+    ),
+    "mpcam.comparison.driver": "compare",
+    "mpcam.comparison.table": "Comparison",
+    "mpcam.errors": "InputError SetupError",
+    "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
+    "mpcam.geometry.load": "load_mesh",
+    "mpcam.geometry.mesh": "Material Mesh",
+    "mpcam.geometry.scene": "DirectionalLight PointLight Scene",
+    "mpcam.io.images": "read_camera read_channels read_image write_image",
+    "mpcam.io.scenes": "load_scene",
+    "mpcam.rendering.hits": "Hits",
+    "mpcam.rendering.interpolate": "interpolate",
+    "mpcam.rendering.methods": "prepare rasterize render",
+    "mpcam.rendering.shade": "shade",
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+_SUBPACKAGES = ("cameras", "comparison", "geometry", "io", "math", "rendering", "truth")
+
+__all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
+    if name in _SUBPACKAGES:
+        return import_module(f"mpcam.{name}")
+    raise AttributeError(f"module 'mpcam' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME, *_SUBPACKAGES])

@@ -1,0 +1,298 @@
+"""Boxes of curved triangles under radial projections.
+
+An edge of a scene triangle lies in a plane through the centre, so it is a great-circle arc of directions, whose image
+turns one way only (FORMULAS 7: nu(s) increases). So along each image axis an arc has at most one extremum per half
+turn, and it lies where the slope along the arc changes its sign; between two points with tangents, the arc stays
+inside the triangle of the two points and the crossing of the tangents. Corners of the box are also reached on the rim,
+where a rim point on an image axis lies inside the triangle.
+"""
+
+from typing import Protocol
+
+from mpcam.cameras.profiles import Profile
+from mpcam.cameras.types import Box
+from mpcam.math import (
+    PI,
+    Array,
+    Vector,
+    absolute,
+    acos,
+    asin,
+    atan2,
+    cos,
+    cross,
+    dot,
+    epsilon,
+    isfinite,
+    maximum,
+    minimum,
+    norm,
+    normalize,
+    sin,
+    sqrt,
+    vector,
+    where,
+)
+
+_PIECES = 8
+_HALVINGS = 5
+_FAR = 1e9  # pixels; stands for infinity
+
+
+class RadialCamera(Protocol):
+    """What the bounds need to know of a camera."""
+
+    @property
+    def profile(self) -> Profile: ...
+    @property
+    def fov(self) -> Array: ...
+    @property
+    def radius(self) -> Array: ...
+    @property
+    def cx(self) -> Array: ...
+    @property
+    def cy(self) -> Array: ...
+    @property
+    def pixels_per_radius(self) -> Array: ...
+
+
+def image_and_slopes(camera: RadialCamera, p: Vector, *velocities: Vector) -> tuple[Vector, list[Vector], Array]:
+    """Pixel of a direction p (any length), pixel velocities for given velocities of p, and the angle from the axis.
+
+    On the axis, where the azimuth is undefined, the projection is a scaling by f'(0) / z.
+    """
+    x, y, z = p
+    squared = x * x + y * y
+    length_squared = squared + z * z
+    off_axis = squared > 1e-12 * length_squared
+    rho = sqrt(where(off_axis, squared, 1.0))
+    ex, ey = where(off_axis, x / rho, 1.0), where(off_axis, y / rho, 0.0)
+    theta = atan2(sqrt(squared), z)
+    reach = where(theta < camera.profile.limit, theta, 0.999999 * camera.profile.limit)
+    scale = camera.pixels_per_radius
+    r, slope = scale * camera.profile.radius(reach), scale * camera.profile.slope(reach)
+    flat = slope / where(z > 0, z, 1.0)
+    sideways = where(off_axis, r / rho, flat)
+    pixel = vector(camera.cx + sideways * x, camera.cy + sideways * y)
+    slopes = []
+    for vx, vy, vz in velocities:
+        along = ex * vx + ey * vy
+        turning = (z * along - rho * vz) / where(length_squared > 0, length_squared, 1.0)
+        radial = where(off_axis, slope * turning, flat * along)
+        slopes.append(vector(radial * ex + sideways * (vx - ex * along), radial * ey + sideways * (vy - ey * along)))
+    return pixel, slopes, theta
+
+
+def tangent_limit(m0: Vector, g0: Vector, m1: Vector, g1: Vector, i: int, span: Array) -> Array:
+    """Coordinate i of the crossing of the tangents at two points of an arc, and at least what the first tangent allows.
+
+    m0, m1: points; g0, g1: velocities; span: length of the parameter interval, the fallback for near-parallel tangents.
+    """
+    turn = g0[0] * g1[1] - g0[1] * g1[0]
+    reach = ((m1[0] - m0[0]) * g1[1] - (m1[1] - m0[1]) * g1[0]) / where(turn != 0, turn, 1.0)
+    usable = (turn != 0) & (reach >= 0) & (reach < 4 * span)
+    return m0[i] + g0[i] * where(usable, reach, span)
+
+
+def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
+    """Box of the image of the great-circle arc between unit directions a and b, within the field of view."""
+    along = dot(a, b)
+    tangent = normalize(vector(*(b[i] - a[i] * along for i in range(3))))
+    length = atan2(norm(cross(a, b)), along)
+    start, span, valid, twice = _visible_part(camera, a, tangent, length)
+
+    def at(s: Array) -> tuple[Vector, Vector]:
+        c, d = cos(s), sin(s)
+        point = vector(*(a[i] * c + tangent[i] * d for i in range(3)))
+        velocity = vector(*(tangent[i] * c - a[i] * d for i in range(3)))
+        pixel, slopes, _ = image_and_slopes(camera, point, velocity)
+        return pixel, slopes[0]
+
+    step = span / _PIECES
+    pixel, slope = at(start)
+    low, high = [pixel[0], pixel[1]], [pixel[0], pixel[1]]
+    brackets = {(i, sign): (start, start, step < 0) for i in (0, 1) for sign in (-1, 1)}
+    for k in range(1, _PIECES + 1):
+        s, before = start + k * step, slope
+        pixel, slope = at(s)
+        for i in (0, 1):
+            low[i], high[i] = minimum(low[i], pixel[i]), maximum(high[i], pixel[i])
+            for sign in (-1, 1):
+                turns = (sign * before[i] > 0) & (sign * slope[i] < 0)
+                left, right, found = brackets[i, sign]
+                brackets[i, sign] = (where(turns, s - step, left), where(turns, s, right), found | turns)
+    for (i, sign), (left, right, found) in brackets.items():
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (left + right)
+            rising = sign * at(middle)[1][i] > 0
+            left, right = where(rising, middle, left), where(rising, right, middle)
+        (m0, g0), (m1, g1) = at(left), at(right)
+        limit = tangent_limit(m0, g0, m1, g1, i, right - left)
+        if sign > 0:
+            high[i] = maximum(high[i], where(found, limit, high[i]))
+        else:
+            low[i] = minimum(low[i], where(found, limit, low[i]))
+    centre = (camera.cx, camera.cy)
+    low = [where(twice, centre[i] - camera.radius, low[i]) for i in (0, 1)]
+    high = [where(twice, centre[i] + camera.radius, high[i]) for i in (0, 1)]
+    return Box(vector(*low), vector(*high), valid)
+
+
+def _visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array) -> tuple[Array, Array, Array, Array]:
+    """Part of an arc within the field of view: start, span, whether there is any, whether there are two parts.
+
+    The arc is a cos s + tangent sin s, s in [0, length]; its height over the camera plane is R cos(s - crest).
+    """
+    reach = sqrt(a[2] * a[2] + tangent[2] * tangent[2])
+    crest = atan2(tangent[2], a[2])
+    ratio = cos(0.5 * camera.fov + 0.0 * reach) / where(reach > 0, reach, 1.0)
+    half = where(ratio >= 1, 0.0, acos(maximum(minimum(ratio, 1.0), -1.0)))
+    slack = 8 * PI * epsilon(reach)
+    parts = []
+    for turn in (-2 * PI, 0.0, 2 * PI):
+        first = maximum(crest + turn - half - slack, 0.0)
+        last = minimum(crest + turn + half + slack, length)
+        parts.append((first, last, (last >= first) & (ratio <= 1 + slack)))
+    everything = ratio <= -1
+    start, end, valid = parts[0]
+    twice = valid & False
+    for first, last, some in parts[1:]:
+        twice = twice | (valid & some)
+        start, end = where(some & ~valid, first, start), where(some & ~valid, last, end)
+        valid = valid | some
+    start, end = where(everything, 0.0, start), where(everything, length, end)
+    return start, maximum(end - start, 0.0), valid | everything, twice & ~everything
+
+
+def _clean(a: Vector, b: Vector, c: Vector) -> tuple[list[Vector], Array]:
+    """Unit directions of finite corners (others replaced), and whether all are finite."""
+    finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
+    corners = [vector(where(finite, p[0], 0.0), where(finite, p[1], 0.0), where(finite, p[2], 1.0)) for p in (a, b, c)]
+    return [normalize(p) for p in corners], finite
+
+
+def _disc(camera: RadialCamera, box: Box, whole: Array) -> Box:
+    """The box, or the whole image circle where `whole` holds."""
+    low = vector(*(where(whole, (camera.cx, camera.cy)[i] - camera.radius, box.low[i]) for i in (0, 1)))
+    high = vector(*(where(whole, (camera.cx, camera.cy)[i] + camera.radius, box.high[i]) for i in (0, 1)))
+    return Box(low, high, box.valid | whole)
+
+
+def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
+    """Box of a triangle (camera frame): union of its arcs' boxes and of the rim points that lie inside it."""
+    corners, finite = _clean(a, b, c)
+    if not camera.profile.convex:
+        box = sector_bound(camera, corners)
+        return Box(box.low, box.high, box.valid & finite)
+    low, high, valid = [_FAR, _FAR], [-_FAR, -_FAR], ~finite & finite
+    through_eye = valid
+    for p, q in ((0, 1), (1, 2), (2, 0)):
+        arc = arc_box(camera, corners[p], corners[q])
+        for i in (0, 1):
+            low[i] = minimum(low[i], where(arc.valid, arc.low[i], _FAR))
+            high[i] = maximum(high[i], where(arc.valid, arc.high[i], -_FAR))
+        valid = valid | arc.valid
+        # Opposite corners, or one at the centre: the edge passes through the eye, its arc is undefined.
+        through_eye = through_eye | (dot(corners[p], corners[q]) < -1 + 1e-6) | (dot(corners[p], corners[p]) < 0.5)
+    normals = [cross(corners[(i + 1) % 3], corners[(i + 2) % 3]) for i in range(3)]
+    facing = where(dot(corners[0], normals[0]) < 0, -1.0, 1.0)
+    z, side = cos(0.5 * camera.fov + 0.0 * facing), sin(0.5 * camera.fov + 0.0 * facing)
+    centre = (camera.cx, camera.cy)
+    for i in (0, 1):
+        for sign in (-1, 1):
+            rim = vector(sign * side * (1 - i), sign * side * i, z)
+            edges = [facing * dot(normal, rim) for normal in normals]
+            inside = minimum(minimum(edges[0], edges[1]), edges[2]) >= -1e-6
+            valid = valid | inside
+            if sign > 0:
+                high[i] = maximum(high[i], where(inside, centre[i] + camera.radius, -_FAR))
+            else:
+                low[i] = minimum(low[i], where(inside, centre[i] - camera.radius, _FAR))
+    box = _disc(camera, Box(vector(*low), vector(*high), valid), through_eye)
+    return _padded(camera, Box(box.low, box.high, box.valid & finite))
+
+
+def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
+    """Box by the tangents at the corners where the triangle is inside the view and its edges turn little.
+
+    Elsewhere the annular sector of the triangle's bounding cone. Both hold the image; neither needs a root.
+    """
+    corners, finite = _clean(a, b, c)
+    sector = sector_bound(camera, corners)
+    if not camera.profile.convex:
+        return Box(sector.low, sector.high, sector.valid & finite)
+    images, tangents, inside = [], [], finite
+    for k in range(3):
+        after, before = corners[(k + 1) % 3], corners[(k + 2) % 3]
+        forward = vector(*(after[i] - corners[k][i] for i in range(3)))
+        backward = vector(*(corners[k][i] - before[i] for i in range(3)))
+        pixel, slopes, theta = image_and_slopes(camera, corners[k], forward, backward)
+        images.append(pixel)
+        tangents.append(slopes)
+        inside = inside & (theta < minimum(0.5 * camera.fov, 0.95 * camera.profile.limit)) & (dot(corners[k], after) > 0.7)
+    low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
+    high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
+    for k in range(3):
+        m0, m1, g0, g1 = images[k], images[(k + 1) % 3], tangents[k][0], tangents[(k + 1) % 3][1]
+        agreement = g0[0] * g1[0] + g0[1] * g1[1]
+        squares = (g0[0] * g0[0] + g0[1] * g0[1]) * (g1[0] * g1[0] + g1[1] * g1[1])
+        inside = inside & ((squares == 0) | ((agreement > 0) & (agreement * agreement > 0.75 * squares)))
+        for i in (0, 1):
+            limit = tangent_limit(m0, g0, m1, g1, i, 1.0)
+            high[i] = maximum(high[i], where((g0[i] > 0) & (g1[i] < 0), limit, high[i]))
+            low[i] = minimum(low[i], where((g0[i] < 0) & (g1[i] > 0), limit, low[i]))
+    box = Box(
+        vector(*(where(inside, low[i], sector.low[i]) for i in (0, 1))),
+        vector(*(where(inside, high[i], sector.high[i]) for i in (0, 1))),
+        finite & (inside | sector.valid),
+    )
+    return _padded(camera, box)
+
+
+def sector_bound(camera: RadialCamera, corners: list[Vector]) -> Box:
+    """Box of the annular sector that holds the triangle's bounding cone; for any increasing profile.
+
+    corners: unit directions. The cone's axis is the mean direction; a cone of 90 degrees or more gives the whole disc.
+    """
+    axis = normalize(vector(*(corners[0][i] + corners[1][i] + corners[2][i] for i in range(3))))
+    cosine = minimum(minimum(dot(axis, corners[0]), dot(axis, corners[1])), dot(axis, corners[2]))
+    wide = (cosine < 0.01) | (dot(corners[0], corners[0]) < 0.5)
+    wide = wide | (dot(corners[1], corners[1]) < 0.5) | (dot(corners[2], corners[2]) < 0.5)
+    cosine = minimum(cosine, 1.0)
+    sine = sqrt(maximum(1.0 - cosine * cosine, 0.0)) + 4 * sqrt(epsilon(cosine)) * 0.0
+    spread = maximum(atan2(sine, cosine), 2e-4 if epsilon(cosine) > 1e-10 else 1e-8)
+    sideways = sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    theta = atan2(sideways, axis[2])
+    half_fov = 0.5 * camera.fov
+    valid = wide | (theta - spread <= half_fov)
+    inner, outer = maximum(theta - spread, 0.0), minimum(theta + spread, half_fov)
+    around = (theta <= spread) | (theta + spread >= PI)
+    opening = where(around, 0.0, sin(spread) / where(around, 1.0, maximum(sin(theta), 1e-30)))
+    half_turn = where(around, PI, asin(minimum(opening, 1.0)) + 1e-6)
+    scale = camera.pixels_per_radius
+    inner = where(around, 0.0, minimum(inner, half_fov))
+    r0, r1 = scale * camera.profile.radius(inner), scale * camera.profile.radius(outer)
+    azimuth = atan2(axis[1], axis[0])
+    low, high = [], []
+    for i, centre in enumerate((camera.cx, camera.cy)):
+        limits = []
+        for target in (i * 0.5 * PI, i * 0.5 * PI + PI):  # azimuths of the positive and the negative image axis
+            away = absolute(_wrapped(azimuth - target))
+            nearest = maximum(away - half_turn, 0.0)  # angle from that image axis to the sector
+            cosine = cos(nearest)
+            limits.append(where(cosine >= 0, r1, r0) * cosine)
+        high.append(centre + limits[0])
+        low.append(centre - limits[1])
+    return _disc(camera, _padded(camera, Box(vector(*low), vector(*high), valid)), wide)
+
+
+def _wrapped(angle: Array) -> Array:
+    """An angle in [-2 pi, 2 pi] brought to [-pi, pi]."""
+    angle = where(angle > PI, angle - 2 * PI, angle)
+    return where(angle < -PI, angle + 2 * PI, angle)
+
+
+def _padded(camera: RadialCamera, box: Box) -> Box:
+    """A box grown by what rounding can amount to: a few hundred units in the last place of the radius."""
+    pad = 200 * epsilon(box.low[0]) * camera.radius
+    return Box(vector(box.low[0] - pad, box.low[1] - pad), vector(box.high[0] + pad, box.high[1] + pad), box.valid)

@@ -1,0 +1,210 @@
+"""What every camera model shares: the public edge (arrays of points and pixels, world frame) around its own maps.
+
+A model is a final frozen dataclass that supplies three maps in its own frame, components first, for NumPy, JAX and
+Dr.Jit arrays alike: `local_ray`, `local_project` and `local_bound`.
+"""
+
+import dataclasses
+import sys
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mpcam.cameras.pose import as_pose
+from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.errors import InputError
+from mpcam.math import Array, Vector, library, rotate, rotate_back, translation, vector
+
+
+def _components(values: Array, count: int, name: str) -> Vector:
+    """(..., count) NumPy or JAX array to components first; Dr.Jit vectors are so already."""
+    kind = library(values)
+    if kind == "drjit":
+        return values
+    if kind == "jax":
+        import jax.numpy as jnp
+
+        array: Any = jnp.asarray(values)
+    else:
+        try:
+            array = np.asarray(values, np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{name}: numbers of shape (..., {count}) are needed, got {type(values).__name__}") from None
+    if array.ndim == 0 or array.shape[-1] != count:
+        raise InputError(f"{name} has shape {array.shape}: the last axis must have length {count}")
+    return np.moveaxis(array, -1, 0) if kind == "numpy" else jnp.moveaxis(array, -1, 0)
+
+
+def _last(components: Vector) -> Array:
+    """Components first to the usual (..., 3) layout."""
+    kind = library(components)
+    if kind == "drjit":
+        return components
+    if kind == "jax":
+        import jax.numpy as jnp
+
+        return jnp.moveaxis(components, 0, -1)
+    return np.moveaxis(components, 0, -1)
+
+
+class Camera:
+    """Base of the camera models: width, height (pixels) and camera_from_world (4x4, rigid)."""
+
+    width: int
+    height: int
+    camera_from_world: Any
+
+    central: ClassVar[bool] = True
+    """Whether all rays leave from the origin of the camera frame."""
+    images_per_point: ClassVar[int] = 1
+    static_fields: ClassVar[tuple[str, ...]] = ("width", "height")
+    """Fields that are part of the program rather than of the data (JAX, frozen kernels)."""
+
+    def local_ray(self, pixel: Vector) -> Ray:
+        raise TypeError(f"{type(self).__name__} must define local_ray")
+
+    def local_project(self, point: Vector) -> tuple[Projection, ...]:
+        raise TypeError(f"{type(self).__name__} must define local_project")
+
+    def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
+        raise TypeError(f"{type(self).__name__} must define local_bound")
+
+    @property
+    def domain(self) -> Domain:
+        raise TypeError(f"{type(self).__name__} must define domain")
+
+    def ray(self, pixel: Array) -> Ray:
+        """Rays of pixels, in the world frame.
+
+        pixel (..., 2): u right, v down. Returns Ray with origin (..., 3), unit direction (..., 3), valid (...).
+        Dr.Jit: an Array2f in, Array3f out. Raises InputError when the last axis is not 2.
+        """
+        register_pytrees()
+        origin, direction, valid = self.local_ray(_components(pixel, 2, "pixel"))
+        pose, shift = self.camera_from_world, translation(self.camera_from_world)
+        moved = vector(origin[0] - shift[0], origin[1] - shift[1], origin[2] - shift[2])
+        return Ray(_last(rotate_back(pose, moved)), _last(rotate_back(pose, direction)), valid)
+
+    def project(self, points: Array) -> Projection:
+        """All images of points.
+
+        points (..., 3): world frame. Returns Projection with pixel (..., k, 2), depth (..., k), valid (..., k).
+        Dr.Jit: an Array3f in, tuples of k entries out. Raises InputError when the last axis is not 3.
+        """
+        register_pytrees()
+        images = self.local_project(self.local(_components(points, 3, "points")))
+        kind = library(images[0].depth)
+        if kind == "drjit":
+            return Projection(*(tuple(image[i] for image in images) for i in range(3)))
+        if kind == "jax":
+            import jax.numpy as functions
+        else:
+            functions = np
+        return Projection(
+            functions.stack([_last(image.pixel) for image in images], -2),
+            functions.stack([image.depth for image in images], -1),
+            functions.stack([image.valid for image in images], -1),
+        )
+
+    def bound(self, triangle: Array) -> Box:
+        """A box of pixels that holds the whole image of each triangle (conservative; as tight as the model allows).
+
+        triangle (..., 3, 3): corners by rows, world frame. Returns Box with low (..., 2), high (..., 2), valid (...).
+        """
+        corners = _components(triangle, 3, "triangle")
+        if corners.ndim < 2 or corners.shape[-1] != 3:
+            raise InputError(f"triangle has shape {np.shape(triangle)}: (..., 3, 3) is needed, corners by rows")
+        box = self.local_bound(*(self.local(corners[..., i]) for i in range(3)))
+        return Box(_last(box.low), _last(box.high), box.valid)
+
+    def local(self, point: Vector) -> Vector:
+        """World point to the camera frame, components first."""
+        turned, shift = rotate(self.camera_from_world, point), translation(self.camera_from_world)
+        return vector(turned[0] + shift[0], turned[1] + shift[1], turned[2] + shift[2])
+
+    def contains(self, pixel: Array) -> Array:
+        """Whether pixels (..., 2) lie inside the image rectangle."""
+        u, v = _components(pixel, 2, "pixel")
+        return (u >= 0) & (v >= 0) & (u <= self.width) & (v <= self.height)
+
+    def with_pose(self, camera_from_world: Array) -> Self:
+        """The same camera at another pose."""
+        return dataclasses.replace(self, camera_from_world=camera_from_world)  # pyright: ignore[reportArgumentType]
+
+    @property
+    def eye(self) -> np.ndarray:
+        """Origin of the camera frame, (3,) in the world."""
+        pose = np.asarray(self.camera_from_world)
+        return -pose[:3, :3].T @ pose[:3, 3]
+
+    @property
+    def world_to_camera(self) -> Any:
+        """Other name of `camera_from_world`."""
+        return self.camera_from_world
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [field.name for field in dataclasses.fields(self)]  # pyright: ignore[reportArgumentType]
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+    def _check_frame(self) -> None:
+        """Check and normalize width, height and pose at construction."""
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise InputError(f"{type(self).__name__}({name}={value!r}): a whole number of pixels >= 1 is needed")
+            object.__setattr__(self, name, int(value))
+        object.__setattr__(self, "camera_from_world", as_pose(self.camera_from_world))
+        register_pytrees()
+
+    def _check_number(self, name: str, low: float = -np.inf, high: float = np.inf) -> None:
+        """Check that a field is a finite number strictly between low and high; other libraries' arrays pass."""
+        value = getattr(self, name)
+        if library(value) != "numpy":
+            return
+        allowed = "a finite number" if low == -np.inf else f"a finite number above {low:g}"
+        allowed += "" if high == np.inf else f" and below {high:g}"
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise InputError(f"{type(self).__name__}({name}={value!r}): {allowed} is needed") from None
+        if not (np.isfinite(number) and low < number < high):
+            raise InputError(f"{type(self).__name__}({name}={value!r}): {allowed} is needed")
+        object.__setattr__(self, name, number)
+
+
+_registered: set[type] = set()
+
+
+def register_pytrees() -> None:
+    """Make every camera model a JAX pytree; does nothing while JAX is not loaded, and each model once."""
+    if "jax" not in sys.modules or len(_registered) == len(Camera.__subclasses__()):
+        return
+    tree_util = getattr(sys.modules["jax"], "tree_util", None)  # absent while JAX is still being imported
+    if tree_util is None:
+        return
+    for model in Camera.__subclasses__():
+        if model not in _registered:
+            _registered.add(model)
+            _register(model, tree_util)
+
+
+def _register(model: type, tree_util: Any) -> None:
+    names = [field.name for field in dataclasses.fields(model)]
+    data = [name for name in names if name not in model.static_fields]
+    static = [name for name in names if name in model.static_fields]
+
+    def flatten(camera: Any) -> tuple[list[Any], tuple[Any, ...]]:
+        children = [(tree_util.GetAttrKey(name), getattr(camera, name)) for name in data]
+        return children, tuple(getattr(camera, name) for name in static)
+
+    def unflatten(fixed: tuple[Any, ...], children: Any) -> Any:
+        camera = object.__new__(model)  # leaves may be placeholders, which no check would pass
+        for name, value in (*zip(static, fixed, strict=True), *zip(data, children, strict=True)):
+            object.__setattr__(camera, name, value)
+        return camera
+
+    tree_util.register_pytree_with_keys(model, flatten, unflatten)

@@ -1,0 +1,105 @@
+"""The pinhole camera: straight lines stay straight."""
+
+import dataclasses
+from typing import Any, Self
+
+from mpcam.cameras.base import Camera
+from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.errors import InputError
+from mpcam.math import PI, Array, Vector, epsilon, isfinite, maximum, minimum, norm, normalize, tan, vector, where
+
+_FAR = 1e9  # pixels; stands for infinity in boxes, so that no arithmetic on boxes makes NaN
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pinhole(Camera):
+    """Central perspective: pixel = (cx + fx x / z, cy + fy y / z) for points with z > 0.
+
+    width, height: pixels. fx, fy: focal lengths, pixels (fy defaults to fx, fx to width / 2: 90 degrees across).
+    cx, cy: principal point, pixels, centre of the top left pixel at (0.5, 0.5) (defaults to the image centre).
+    camera_from_world: 4x4, OpenCV axes. Raises InputError for sizes below 1, focal lengths that are not positive,
+    numbers that are not finite, and poses that are not rigid.
+    """
+
+    width: int
+    height: int
+    fx: Any = None
+    fy: Any = None
+    cx: Any = None
+    cy: Any = None
+    camera_from_world: Any = None
+
+    def __post_init__(self) -> None:
+        self._check_frame()
+        defaults = {"fx": 0.5 * self.width, "fy": self.fx, "cx": 0.5 * self.width, "cy": 0.5 * self.height}
+        for name, default in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, self.fx if name == "fy" else default)
+        self._check_number("fx", 0)
+        self._check_number("fy", 0)
+        self._check_number("cx")
+        self._check_number("cy")
+
+    @classmethod
+    def from_fov(cls, width: int, height: int, fov_x: float, camera_from_world: Any = None) -> Self:
+        """Square pixels, centred, `fov_x` radians across the width; raises InputError outside (0, pi)."""
+        if not 0 < fov_x < PI:
+            raise InputError(f"Pinhole.from_fov(fov_x={fov_x!r}): radians between 0 and pi are needed")
+        return cls(width, height, 0.5 * width / tan(0.5 * fov_x), camera_from_world=camera_from_world)
+
+    @property
+    def domain(self) -> Domain:
+        """Rays up to (not including) 90 degrees from the axis; the image is not a disc."""
+        return Domain(0.5 * PI, None)
+
+    def local_ray(self, pixel: Vector) -> Ray:
+        """Ray of a pixel in the camera frame."""
+        u, v = pixel
+        valid = isfinite(u) & isfinite(v)
+        x, y = (where(valid, u, 0.0) - self.cx) / self.fx, (where(valid, v, 0.0) - self.cy) / self.fy
+        zero = 0.0 * x
+        return Ray(vector(zero, zero, zero), normalize(vector(x, y, zero + 1.0)), valid)
+
+    def local_project(self, point: Vector) -> tuple[Projection, ...]:
+        """Image of a point in the camera frame; valid in front of the camera plane."""
+        x, y, z = point
+        valid = (z > 0) & isfinite(x) & isfinite(y) & isfinite(z)
+        x, y, z = where(valid, x, 0.0), where(valid, y, 0.0), where(valid, z, 1.0)
+        point = vector(x, y, z)
+        return (Projection(self.local_image(point)[0], norm(point), valid),)
+
+    def local_image(self, point: Vector) -> tuple[Vector, Array]:
+        """Pixel of a point, and whether it lies in front of the camera plane; the pixel means nothing elsewhere."""
+        x, y, z = point
+        front = z > 0
+        depth = where(front, z, 1.0)
+        return vector(self.cx + self.fx * (x / depth), self.cy + self.fy * (y / depth)), front
+
+    def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """Exact box of the part in front of the camera plane; unbounded sides are at +-1e9 pixels.
+
+        An edge that crosses the camera plane at (x, y, 0) runs to infinity along (x, y).
+        """
+        finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
+        a, b, c = (vector(*(where(finite, corner[i], 1.0) for i in range(3))) for corner in (a, b, c))
+        low, high = [_FAR, _FAR], [-_FAR, -_FAR]
+        focal, center = (self.fx, self.fy), (self.cx, self.cy)
+        for corner in (a, b, c):
+            front = corner[2] > 0
+            depth = where(front, corner[2], 1.0)
+            for i in range(2):
+                image = maximum(minimum(center[i] + focal[i] * (corner[i] / depth), _FAR), -_FAR)
+                low[i] = minimum(low[i], where(front, image, _FAR))
+                high[i] = maximum(high[i], where(front, image, -_FAR))
+        for p, q in ((a, b), (b, c), (c, a)):
+            crosses = (p[2] > 0) != (q[2] > 0)
+            for i in range(2):
+                toward = p[i] * q[2] - q[i] * p[2]  # sign of the crossing point's coordinate, times that of q[2] - p[2]
+                toward = where(q[2] > p[2], toward, -toward)
+                slack = 4 * epsilon(toward) * (abs(p[i] * q[2]) + abs(q[i] * p[2]))
+                low[i] = where(crosses & (toward <= slack), -_FAR, low[i])
+                high[i] = where(crosses & (toward >= -slack), _FAR, high[i])
+        valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
+        return Box(vector(*low), vector(*high), valid)
+
+

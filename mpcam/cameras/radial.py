@@ -1,0 +1,187 @@
+"""Single-centre cameras with radial symmetry, r = f(theta) (Gascuel et al. 2008)."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+from mpcam.cameras.arcs import radial_bound, radial_bound_quick
+from mpcam.cameras.base import Camera
+from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
+from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.errors import InputError
+from mpcam.math import (
+    PI,
+    Array,
+    Vector,
+    atan2,
+    cos,
+    epsilon,
+    isfinite,
+    library,
+    maximum,
+    norm,
+    sin,
+    sqrt,
+    vector,
+    where,
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Radial(Camera):
+    """A ray at angle theta from the axis lands at distance radius * f(theta) / f(fov / 2) from the centre.
+
+    width, height: pixels. profile: a `Profile`, the name of a built-in one, or use the constructors `paraboloid`,
+    `cosine_sphere`, `equisolid`, `equidistant`, `from_function`. camera_from_world: 4x4, OpenCV axes. fov: full angle
+    of view, radians (default pi). radius: pixels from the centre to the rim of the view (default: the inscribed
+    circle). cx, cy: centre, pixels (default: the image centre). With fov = pi, the built-in profiles have f = 1 at the
+    rim. Pixels outside of the rim are invalid.
+
+    Raises InputError for sizes below 1, a field of view that the profile cannot reach, unknown profiles, and poses that
+    are not rigid.
+    """
+
+    width: int
+    height: int
+    profile: Any
+    camera_from_world: Any = None
+    fov: Any = PI
+    radius: Any = None
+    cx: Any = None
+    cy: Any = None
+
+    static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "profile")
+
+    def __post_init__(self) -> None:
+        self._check_frame()
+        if isinstance(self.profile, str):
+            if self.profile not in PROFILES:
+                raise InputError(f"Radial(profile={self.profile!r}): allowed are {', '.join(PROFILES)}")
+            object.__setattr__(self, "profile", PROFILES[self.profile])
+        if not isinstance(self.profile, Profile):
+            raise InputError(f"Radial(profile={self.profile!r}): give a Profile, a name, or use Radial.from_function")
+        defaults = {"radius": 0.5 * min(self.width, self.height), "cx": 0.5 * self.width, "cy": 0.5 * self.height}
+        for name, default in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, default)
+        self._check_number("fov", 0)
+        self._check_number("radius", 0)
+        self._check_number("cx")
+        self._check_number("cy")
+        limit = 2 * self.profile.limit
+        if library(self.fov) == "numpy" and (
+            self.fov > limit * (1 + 1e-12) or (self.fov >= limit and not self.profile.limit_included)
+        ):
+            end = "up to" if self.profile.limit_included else "below"
+            raise InputError(
+                f"Radial(fov={self.fov:.6g}): the {self.profile.name} profile reaches fields of view {end} {limit:.6g} rad"
+            )
+
+    @classmethod
+    def paraboloid(cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any) -> Self:
+        """r = tan(theta / 2), stereographic: keeps angles; fields of view below 360 degrees."""
+        return cls(width, height, PARABOLOID, camera_from_world, fov, **rest)
+
+    @classmethod
+    def cosine_sphere(cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any) -> Self:
+        """r = sin(theta): image area is solid angle times cosine; fields of view up to 180 degrees."""
+        return cls(width, height, COSINE_SPHERE, camera_from_world, fov, **rest)
+
+    @classmethod
+    def equisolid(cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any) -> Self:
+        """r = sqrt(2) sin(theta / 2), Lambert's equal-area projection; fields of view up to 360 degrees."""
+        return cls(width, height, EQUISOLID, camera_from_world, fov, **rest)
+
+    @classmethod
+    def equidistant(cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any) -> Self:
+        """r = 2 theta / pi; fields of view up to 360 degrees."""
+        return cls(width, height, EQUIDISTANT, camera_from_world, fov, **rest)
+
+    @classmethod
+    def from_function(
+        cls,
+        width: int,
+        height: int,
+        function: Callable[[Array], Array],
+        camera_from_world: Any = None,
+        fov: float = PI,
+        *,
+        slope: Callable[[Array], Array] | None = None,
+        angle: Callable[[Array], Array] | None = None,
+        name: str = "custom",
+        **rest: Any,
+    ) -> Self:
+        """A user's own r = function(theta), on [0, fov / 2]; see `custom_profile` for what is checked."""
+        profile = custom_profile(function, 0.5 * fov, slope=slope, angle=angle, name=name)
+        return cls(width, height, profile, camera_from_world, fov, **rest)
+
+    @property
+    def domain(self) -> Domain:
+        """Half the field of view, and the radius of the image circle in pixels."""
+        return Domain(0.5 * self.fov, self.radius)
+
+    @property
+    def pixels_per_radius(self) -> Array:
+        """Pixels per unit of f."""
+        return self.radius / self.profile.radius(0.5 * self.fov)
+
+    def local_ray(self, pixel: Vector) -> Ray:
+        """Ray of a pixel in the camera frame; valid up to the rim."""
+        u, v = pixel
+        valid = isfinite(u) & isfinite(v)
+        x, y = where(valid, u, 0.0) - self.cx, where(valid, v, 0.0) - self.cy
+        squared = x * x + y * y
+        distance = sqrt(where(squared > 0, squared, 1.0))
+        rim = self.radius * (1.0 + 4.0 * epsilon(distance))
+        valid = valid & (squared <= rim * rim)
+        off_axis = valid & (squared > 0)
+        distance = where(off_axis, distance, 1.0)  # 1 stands for pixels that do not matter
+        theta = self.profile.angle(where(off_axis, distance, 0.0) / self.pixels_per_radius)
+        sideways = where(off_axis, sin(theta) / distance, 0.0)
+        zero = 0.0 * x
+        inside = where(valid, 1.0, 0.0)
+        direction = vector(x * sideways * inside, y * sideways * inside, where(valid, cos(theta), 1.0))
+        # At the centre the slope of the direction in the pixel is 1 / (pixels per radian).
+        centre = 1.0 / (self.pixels_per_radius * self.profile.slope(zero))
+        direction = vector(
+            where(off_axis, direction[0], x * centre * inside),
+            where(off_axis, direction[1], y * centre * inside),
+            direction[2],
+        )
+        return Ray(vector(zero, zero, zero), direction, valid)
+
+    def local_project(self, point: Vector) -> tuple[Projection, ...]:
+        """Image of a point in the camera frame; valid up to the rim, not at the camera's centre."""
+        x, y, z = point
+        finite = isfinite(x) & isfinite(y) & isfinite(z)
+        x, y, z = where(finite, x, 0.0), where(finite, y, 0.0), where(finite, z, 0.0)
+        depth = norm(vector(x, y, z))
+        image, inside = self.local_image(vector(x, y, z))
+        valid = finite & (depth > 0) & inside
+        pixel = vector(where(valid, image[0], self.cx), where(valid, image[1], self.cy))
+        return (Projection(pixel, depth, valid),)
+
+    def local_image(self, point: Vector) -> tuple[Vector, Array]:
+        """Pixel of a point, also beyond the rim as far as f goes on, and whether it lies within the field of view."""
+        x, y, z = point
+        largest = maximum(maximum(abs(x), abs(y)), abs(z))
+        scale = 1.0 / where(largest > 0, largest, 1.0)
+        x, y, z = x * scale, y * scale, z * scale
+        squared = x * x + y * y
+        off_axis = squared > 0
+        rho = sqrt(where(off_axis, squared, 1.0))
+        theta = atan2(where(off_axis, rho, 0.0), z)
+        reach = where(theta < self.profile.limit, theta, 0.999999 * self.profile.limit)
+        ahead = where(z > 0, z, 1.0)
+        ratio = where(off_axis, self.profile.radius(reach) / rho, self.profile.slope(0.0 * rho) / ahead)
+        ratio = ratio * self.pixels_per_radius
+        inside = theta <= 0.5 * self.fov + 4 * PI * epsilon(theta)
+        return vector(self.cx + ratio * x, self.cy + ratio * y), inside
+
+    def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """Box of the curved triangle, exact to about 0.01 pixel (annular sectors for profiles that are not convex)."""
+        return radial_bound(self, a, b, c)
+
+    def local_bound_quick(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """A cheaper conservative box, as tight for small triangles."""
+        return radial_bound_quick(self, a, b, c)

@@ -1,0 +1,74 @@
+"""Cameras as plain dictionaries and JSON, for image headers and scene files; a round trip gives an equal camera."""
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.cameras.orthographic import Orthographic
+from mpcam.cameras.pinhole import Pinhole
+from mpcam.cameras.profiles import PROFILES, Profile
+from mpcam.cameras.radial import Radial
+from mpcam.errors import InputError
+
+SCHEMA = 1
+
+MODELS: dict[str, type[Camera]] = {model.__name__: model for model in (Pinhole, Orthographic, Radial)}
+
+
+def camera_to_dict(camera: Camera) -> dict[str, Any]:
+    """Model name, schema version and every field, as numbers, strings and nested lists.
+
+    Raises InputError for a camera whose profile is a user's own function, which no file can hold.
+    """
+    result: dict[str, Any] = {"schema": SCHEMA, "model": type(camera).__name__}
+    for field in dataclasses.fields(camera):  # pyright: ignore[reportArgumentType]
+        value = getattr(camera, field.name)
+        if isinstance(value, Profile):
+            if PROFILES.get(value.name) is not value:
+                raise InputError(
+                    f"a camera with the custom profile {value.name!r} cannot be written: only "
+                    f"{', '.join(PROFILES)} can; keep its function in your program"
+                )
+            value = value.name
+        elif hasattr(value, "shape"):
+            value = np.asarray(value, np.float64).tolist()
+        result[field.name] = value
+    return result
+
+
+def camera_from_dict(data: dict[str, Any]) -> Camera:
+    """The camera that `camera_to_dict` described; raises InputError for unknown models, schemas and fields."""
+    fields = dict(data)
+    schema, name = fields.pop("schema", SCHEMA), fields.pop("model", None)
+    if schema != SCHEMA:
+        raise InputError(f"camera has schema {schema!r}: this version reads schema {SCHEMA}")
+    if name not in MODELS:
+        raise InputError(f"camera model {name!r} is unknown: allowed are {', '.join(MODELS)}")
+    model = MODELS[name]
+    known = {field.name for field in dataclasses.fields(model)}  # pyright: ignore[reportArgumentType]
+    unknown = sorted(set(fields) - known)
+    if unknown:
+        raise InputError(f"camera model {name} has no field {unknown[0]!r}: allowed are {', '.join(sorted(known))}")
+    try:
+        return model(**fields)
+    except TypeError as error:
+        raise InputError(f"camera model {name}: {error}") from None
+
+
+def camera_to_json(camera: Camera) -> str:
+    """`camera_to_dict` as one line of JSON; numbers keep all their digits."""
+    return json.dumps(camera_to_dict(camera), allow_nan=False)
+
+
+def camera_from_json(text: str) -> Camera:
+    """The camera in a line of JSON; raises InputError where the text is none."""
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"camera is not JSON ({error}): give what camera_to_json writes") from None
+    if not isinstance(data, dict):
+        raise InputError(f"camera is a JSON {type(data).__name__}: an object with the key 'model' is needed")
+    return camera_from_dict(data)

@@ -1,0 +1,52 @@
+"""What cameras give back: rays, projections and pixel boxes, with fixed shapes and a mask instead of NaN."""
+
+from typing import NamedTuple
+
+from mpcam.math import Array
+
+
+class Ray(NamedTuple):
+    """Rays of pixels.
+
+    origin (..., 3): scene units. direction (..., 3): unit length. valid (...): False where the pixel has no ray;
+    origin and direction are finite there, and mean nothing.
+    """
+
+    origin: Array
+    direction: Array
+    valid: Array
+
+
+class Projection(NamedTuple):
+    """Images of points; k is the number of images that a point can have at most.
+
+    pixel (..., k, 2): u right, v down, centre of the top left pixel at (0.5, 0.5). depth (..., k): distance along the
+    pixel's ray, scene units. valid (..., k): False where there is no such image. Valid pixels may lie outside of
+    [0, width] x [0, height]: `Camera.contains` tells.
+    """
+
+    pixel: Array
+    depth: Array
+    valid: Array
+
+
+class Box(NamedTuple):
+    """Axis-aligned region of the image that holds the whole image of a triangle.
+
+    low, high (..., 2): pixels, not clipped to the image. valid (...): False where the triangle has no image at all.
+    """
+
+    low: Array
+    high: Array
+    valid: Array
+
+
+class Domain(NamedTuple):
+    """Where a camera is defined.
+
+    max_angle: largest angle between the optical axis and a ray, radians; None where rays have no common centre.
+    image_radius: radius of the image circle around `center`, pixels; None where the image is not a disc.
+    """
+
+    max_angle: float | None
+    image_radius: float | None

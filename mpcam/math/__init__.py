@@ -1,0 +1,33 @@
+"""Arithmetic written once, for NumPy, JAX and Dr.Jit arrays alike."""
+
+from mpcam.math.arrays import PI as PI
+from mpcam.math.arrays import Array as Array
+from mpcam.math.arrays import absolute as absolute
+from mpcam.math.arrays import acos as acos
+from mpcam.math.arrays import asin as asin
+from mpcam.math.arrays import atan as atan
+from mpcam.math.arrays import atan2 as atan2
+from mpcam.math.arrays import cos as cos
+from mpcam.math.arrays import detach as detach
+from mpcam.math.arrays import epsilon as epsilon
+from mpcam.math.arrays import isfinite as isfinite
+from mpcam.math.arrays import library as library
+from mpcam.math.arrays import maximum as maximum
+from mpcam.math.arrays import minimum as minimum
+from mpcam.math.arrays import safe_divide as safe_divide
+from mpcam.math.arrays import sin as sin
+from mpcam.math.arrays import sqrt as sqrt
+from mpcam.math.arrays import tan as tan
+from mpcam.math.arrays import where as where
+from mpcam.math.roots import central_slope as central_slope
+from mpcam.math.roots import invert_increasing as invert_increasing
+from mpcam.math.vectors import Vector as Vector
+from mpcam.math.vectors import cross as cross
+from mpcam.math.vectors import dot as dot
+from mpcam.math.vectors import entry as entry
+from mpcam.math.vectors import norm as norm
+from mpcam.math.vectors import normalize as normalize
+from mpcam.math.vectors import rotate as rotate
+from mpcam.math.vectors import rotate_back as rotate_back
+from mpcam.math.vectors import translation as translation
+from mpcam.math.vectors import vector as vector

@@ -1,0 +1,119 @@
+"""The dozen elementwise functions whose home differs between NumPy, JAX and Dr.Jit.
+
+Every equation of the toolkit is written once with these functions and the plain operators, and then runs on NumPy
+float64 (checks), JAX (fits, gradients) and Dr.Jit (kernels). The library is chosen by the type of the arguments;
+neither JAX nor Dr.Jit is imported unless one of its arrays comes in.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+Array = Any  # a NumPy, JAX or Dr.Jit array, or a Python number
+
+PI = 3.141592653589793
+
+
+def library(*values: Array) -> str:
+    """Name of the array library of the first argument that is not a NumPy array or a Python number.
+
+    Returns "numpy", "jax" or "drjit".
+    """
+    for value in values:
+        top = type(value).__module__.partition(".")[0]
+        if top in ("drjit", "mitsuba"):
+            return "drjit"
+        if top in ("jax", "jaxlib"):
+            return "jax"
+    return "numpy"
+
+
+def _functions(*values: Array) -> ModuleType:
+    name = library(*values)
+    if name == "drjit":
+        return sys.modules["drjit"]
+    if name == "jax":
+        import jax.numpy
+
+        return jax.numpy
+    return np
+
+
+def sqrt(x: Array) -> Array:
+    return _functions(x).sqrt(x)
+
+
+def sin(x: Array) -> Array:
+    return _functions(x).sin(x)
+
+
+def cos(x: Array) -> Array:
+    return _functions(x).cos(x)
+
+
+def tan(x: Array) -> Array:
+    return _functions(x).tan(x)
+
+
+def asin(x: Array) -> Array:
+    return _functions(x).asin(x)
+
+
+def acos(x: Array) -> Array:
+    return _functions(x).acos(x)
+
+
+def atan(x: Array) -> Array:
+    return _functions(x).atan(x)
+
+
+def atan2(y: Array, x: Array) -> Array:
+    return _functions(y, x).atan2(y, x)
+
+
+def absolute(x: Array) -> Array:
+    return _functions(x).abs(x)
+
+
+def minimum(x: Array, y: Array) -> Array:
+    return _functions(x, y).minimum(x, y)
+
+
+def maximum(x: Array, y: Array) -> Array:
+    return _functions(x, y).maximum(x, y)
+
+
+def isfinite(x: Array) -> Array:
+    return _functions(x).isfinite(x)
+
+
+def where(condition: Array, x: Array, y: Array) -> Array:
+    """x where the condition holds, else y."""
+    functions = _functions(condition, x, y)
+    return functions.select(condition, x, y) if functions.__name__ == "drjit" else functions.where(condition, x, y)
+
+
+def detach(x: Array) -> Array:
+    """The same value, without a derivative."""
+    name = library(x)
+    if name == "jax":
+        import jax
+
+        return jax.lax.stop_gradient(x)
+    return sys.modules["drjit"].detach(x) if name == "drjit" else x
+
+
+def epsilon(x: Array) -> float:
+    """Distance from 1 to the next number in the precision of x: 2**-23 or 2**-52."""
+    if library(x) == "drjit":
+        drjit = sys.modules["drjit"]
+        return 2.0**-52 if drjit.type_v(x) == drjit.VarType.Float64 else 2.0**-23
+    return 2.0**-23 if getattr(x, "dtype", None) == np.float32 else 2.0**-52
+
+
+def safe_divide(x: Array, y: Array, otherwise: Array = 0.0) -> Array:
+    """x / y, and `otherwise` where y is zero; the guard stands on both sides, so gradients stay finite too."""
+    nonzero = y != 0
+    return where(nonzero, x / where(nonzero, y, 1.0), otherwise)

@@ -1,0 +1,75 @@
+"""Vectors with the component first: `x, y, z = p` unpacks a (3, N) NumPy or JAX array and a Dr.Jit Array3f alike."""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from mpcam.math.arrays import Array, library, maximum, sqrt, where
+
+Vector = Array  # unpacks into 2 or 3 components of equal shape
+
+
+def vector(*components: Array) -> Vector:
+    """Join components into one vector of the library that they belong to."""
+    name = library(*components)
+    if name == "drjit":
+        leaf = next(c for c in components if library(c) == "drjit")
+        drjit = sys.modules["drjit"]
+        suffix = "f64" if drjit.type_v(leaf) == drjit.VarType.Float64 else "f"
+        kind = getattr(sys.modules[type(leaf).__module__], f"Array{len(components)}{suffix}")
+        return kind(*components)
+    if name == "jax":
+        import jax.numpy as jnp
+
+        return jnp.stack(jnp.broadcast_arrays(*components))
+    return np.stack(np.broadcast_arrays(*components))
+
+
+def dot(a: Vector, b: Vector) -> Array:
+    """Inner product of two 3-vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Cross product of two 3-vectors."""
+    return vector(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def norm(a: Vector) -> Array:
+    """Length of a 3-vector; its gradient at the zero vector is zero."""
+    squared = dot(a, a)
+    nonzero = squared > 0
+    return where(nonzero, sqrt(where(nonzero, squared, 1.0)), 0.0)
+
+
+def normalize(a: Vector) -> Vector:
+    """The 3-vector at length 1; the zero vector stays zero. Scaled first: no overflow from 1e-30 to 1e30 in float32."""
+    largest = maximum(maximum(abs(a[0]), abs(a[1])), abs(a[2]))
+    scale = 1.0 / where(largest > 0, largest, 1.0)
+    scaled = vector(a[0] * scale, a[1] * scale, a[2] * scale)
+    length = norm(scaled)
+    return scaled * (1.0 / where(length > 0, length, 1.0))
+
+
+def entry(matrix: Array, row: int, column: int) -> Array:
+    """One entry of a matrix; as a Python float if it is a NumPy number, which would seize the arithmetic."""
+    value = matrix[row][column]
+    return float(value) if isinstance(value, (np.floating, np.integer)) else value
+
+
+def rotate(matrix: Array, p: Vector) -> Vector:
+    """Upper left 3x3 block of a 4x4 matrix times p."""
+    rows = [[entry(matrix, i, j) for j in range(3)] for i in range(3)]
+    return vector(*(row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in rows))
+
+
+def rotate_back(matrix: Array, p: Vector) -> Vector:
+    """Transpose of the upper left 3x3 block of a 4x4 matrix times p."""
+    rows = [[entry(matrix, j, i) for j in range(3)] for i in range(3)]
+    return vector(*(row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in rows))
+
+
+def translation(matrix: Array) -> Sequence[Array]:
+    """The three entries of the last column of a 4x4 matrix."""
+    return [entry(matrix, i, 3) for i in range(3)]
