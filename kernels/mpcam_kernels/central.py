@@ -1,0 +1,71 @@
+"""Which rays through one point hit a triangle: homogeneous edge functions.
+
+A ray along d from the origin hits triangle (a, b, c) where d . (b x c), d . (c x a) and d . (a x b) have one sign.
+"""
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+Float = Any
+Vector = Any
+
+
+class CentralTriangle(NamedTuple):
+    """Edge normals (towards the inside), the plane's normal n (away from the eye), and offset = n . a > 0."""
+
+    edges: tuple[Vector, Vector, Vector]
+    normal: Vector
+    offset: Float
+    usable: Any
+
+
+def _follows(p: Vector, q: Vector) -> Any:
+    """Lexicographic order of positions."""
+    return (p.x > q.x) | ((p.x == q.x) & ((p.y > q.y) | ((p.y == q.y) & (p.z > q.z))))
+
+
+def _edge_normal(p: Vector, q: Vector) -> Vector:
+    """p x q, to the bit the negative of q x p, so that neighbours leave no gap between them.
+
+    Written with q - p, which is exact for short edges: the edge is then off by an angle of a few units in the last
+    place, however small the triangle is.
+    """
+    swap = _follows(p, q)
+    low, high = dr.select(swap, q, p), dr.select(swap, p, q)
+    normal = dr.cross(low, high - low)
+    return dr.select(swap, -normal, normal)
+
+
+def setup(a: Vector, b: Vector, c: Vector) -> CentralTriangle:
+    """Edge functions of triangles with corners a, b, c seen from the origin; unusable where seen edge-on."""
+    normal = dr.cross(b - a, c - a)
+    offset = dr.dot(a, normal)
+    edges = (_edge_normal(b, c), _edge_normal(c, a), _edge_normal(a, b))
+    flip = offset < 0
+    edges = tuple(dr.select(flip, -edge, edge) for edge in edges)
+    return CentralTriangle(edges, dr.select(flip, -normal, normal), abs(offset), offset != 0)
+
+
+def hit(triangle: CentralTriangle, direction: Vector) -> tuple[Any, Float]:
+    """Whether rays hit the triangle, and the distance along the direction."""
+    e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
+    speed = dr.dot(triangle.normal, direction)
+    inside = (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (speed > 0)
+    return inside, triangle.offset / speed
+
+
+def weights(triangle: CentralTriangle, direction: Vector) -> tuple[Float, Float]:
+    """Barycentric weights of corners b and c at the point that a ray hits."""
+    e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
+    scale = 1.0 / (e0 + e1 + e2)
+    return e1 * scale, e2 * scale
+
+
+def may_hit(triangle: CentralTriangle, centre: Vector, spread: Float) -> Any:
+    """False only where no direction within `spread` (length of the difference) of `centre` hits the triangle."""
+    possible = triangle.usable
+    for edge in triangle.edges:
+        reach = dr.sqrt(dr.squared_norm(edge))
+        possible = possible & (dr.dot(edge, centre) + reach * (spread + 1e-6) >= 0)
+    return possible

@@ -1,0 +1,66 @@
+"""Which pixels a straight-edged triangle covers in the image plane, for parallel rays and for projected vertices."""
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+Float = Any
+Vector = Any
+
+
+class PlanarTriangle(NamedTuple):
+    """Edges as a corner and a direction (signed so that the inside is positive), corner depths, twice the area."""
+
+    starts: tuple[Vector, Vector, Vector]
+    steps: tuple[Vector, Vector, Vector]
+    depths: Vector
+    area: Float
+    usable: Any
+
+
+def _edge(p: Vector, q: Vector, flip: Any) -> tuple[Vector, Vector]:
+    """The edge from its lexicographically lower end, so that neighbours compute the same numbers."""
+    swap = (p.x > q.x) | ((p.x == q.x) & (p.y > q.y))
+    low, high = dr.select(swap, q, p), dr.select(swap, p, q)
+    return low, dr.select(swap ^ flip, low - high, high - low)
+
+
+def setup(a: Vector, b: Vector, c: Vector) -> PlanarTriangle:
+    """Edge functions of image triangles; x, y of the corners are pixels and z their depths."""
+    area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+    flip = area < 0
+    pairs = [_edge(p.xy, q.xy, flip) for p, q in ((b, c), (c, a), (a, b))]
+    depths = type(a)(a.z, b.z, c.z)
+    starts, steps = tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
+    return PlanarTriangle(starts, steps, depths, abs(area), area != 0)  # pyright: ignore[reportArgumentType]
+
+
+def _edges(triangle: PlanarTriangle, pixel: Vector) -> list[Float]:
+    return [
+        step.x * (pixel.y - start.y) - step.y * (pixel.x - start.x)
+        for start, step in zip(triangle.starts, triangle.steps, strict=True)
+    ]
+
+
+def hit(triangle: PlanarTriangle, pixel: Vector) -> tuple[Any, Float]:
+    """Whether pixels are covered, and the linearly interpolated depth there (which must be positive)."""
+    e0, e1, e2 = _edges(triangle, pixel)
+    total = e0 + e1 + e2
+    depth = (e0 * triangle.depths.x + e1 * triangle.depths.y + e2 * triangle.depths.z) / total
+    return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (total > 0) & (depth > 0), depth
+
+
+def weights(triangle: PlanarTriangle, pixel: Vector) -> tuple[Float, Float]:
+    """Barycentric weights of corners b and c."""
+    e0, e1, e2 = _edges(triangle, pixel)
+    scale = 1.0 / (e0 + e1 + e2)
+    return e1 * scale, e2 * scale
+
+
+def may_hit(triangle: PlanarTriangle, centre: Vector, spread: Float) -> Any:
+    """False only where no pixel within `spread` of `centre` along each axis is covered."""
+    possible = triangle.usable
+    for value, step in zip(_edges(triangle, centre), triangle.steps, strict=True):
+        reach = abs(step.x) + abs(step.y)
+        possible = possible & (value + reach * (spread + 1e-3) >= 0)
+    return possible
