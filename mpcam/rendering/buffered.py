@@ -1,0 +1,139 @@
+"""What the rasterizing methods share: place vertices, run the kernels, decode the depth buffer."""
+
+import functools
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.geometry.mesh import Mesh
+from mpcam.rendering.clock import Clock
+from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
+from mpcam.rendering.hits import Hits, Stats
+
+
+def curved_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
+    """The camera's own box of a triangle; the cheaper one where it has two."""
+    box = getattr(camera, "local_bound_quick", camera.local_bound)(a, b, c)
+    return box.low, box.high, box.valid
+
+
+def image_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
+    """Box of straight-edged image triangles; without an image where a corner is not finite."""
+    import drjit as dr
+
+    low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
+    return low.xy, high.xy, dr.isfinite(a.x + b.x + c.x + a.y + b.y + c.y + a.z + b.z + c.z)
+
+
+@functools.lru_cache(maxsize=64)
+def _pipeline(model: type | None, static: tuple[Any, ...], width: int, height: int, count: bool, backend: str) -> Any:
+    from mpcam_kernels import central, planar
+    from mpcam_kernels.pipeline import Pipeline
+
+    curved = model is not None
+    return Pipeline(types(), curved_box if curved else image_box, central if curved else planar, width, height, count)
+
+
+class Buffered:
+    """Frames of one camera and mesh by a depth buffer.
+
+    curved: rays through one point are tested against triangles in the camera frame; otherwise pixels against
+    straight-edged triangles in the image plane, which is exact for parallel rays.
+    """
+
+    method: ClassVar[str]
+
+    def __init__(self, camera: Camera, mesh: Mesh, curved: bool):
+        self.camera, self.mesh, self.curved = camera, mesh, curved
+        self.device = device_mesh(mesh)
+        self.vertices, self.faces = self.device.vertices, self.device.faces
+        self.lens: Lens = lens(camera)
+        self.samples = self.lens.directions if curved else self.lens.centres
+        self.pose = self.device.pose(camera)
+        self.unit = opaque_numbers([self.device.scale])[0]
+
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
+        self.vertices = self.device.place(np.asarray(vertices))
+
+    def place(self, vertices: Any) -> Any:
+        """Device vertices to what the kernels take: camera frame in units of the mesh's scale, or (pixel, depth)."""
+        raise TypeError(f"{type(self).__name__} must define place")
+
+    def parent(self, triangle: Any) -> Any:
+        """Face of the mesh that a kernel's triangle belongs to."""
+        return triangle
+
+    def parent_weights(self, triangle: Any, second: Any, third: Any) -> tuple[Any, Any]:
+        """Barycentric weights within that face."""
+        return second, third
+
+    def buffer(self, clock: Clock | None = None, count: bool = False) -> tuple[Any, Any]:
+        """The depth buffer, and (tests, rendered) where they are to be counted."""
+        from mpcam_kernels.backend import backend_name
+
+        done = clock.done if clock else None
+        positions = self.place(self.vertices) if self.mesh.triangle_count else self.vertices
+        if done:
+            done("vertices", positions)
+        camera, model, static = None, None, ()
+        if self.curved:
+            camera, model = self.lens.on_device, type(self.camera)
+            static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
+        kernels = _pipeline(model, static, self.camera.width, self.camera.height, count, backend_name())
+        return kernels.frame(camera, positions, self.faces, self.samples, done)
+
+    def frame(self) -> Hits:
+        """One frame, evaluated: triangle and depth of every pixel."""
+        return self._hits(self.buffer()[0])
+
+    def stages(self) -> dict[str, float]:
+        """Seconds of one frame by stage."""
+        clock = Clock()
+        buffer, _ = self.buffer(clock)
+        self._hits(buffer)
+        clock.done("decode")
+        return clock.seconds
+
+    def _hits(self, buffer: Any) -> Hits:
+        from mpcam_kernels import central, decode, planar
+
+        vertices = self.vertices
+        small, depth = _frozen_decode()(buffer, self.unit if self.curved else opaque_one())
+        triangle = self.parent(small)
+
+        def weights() -> tuple[Any, Any]:
+            if self.mesh.triangle_count == 0:
+                return depth * 0.0, depth * 0.0
+            test = central if self.curved else planar
+            found = decode.weights(types(), test, self.place(vertices), self.faces, small, self.samples.pixels)
+            return self.parent_weights(small, *found)
+
+        def stats() -> Stats:
+            if self.mesh.triangle_count == 0:
+                return Stats(0, 0)
+            tests, rendered = self.buffer(count=True)[1].numpy()
+            return Stats(int(tests), int(rendered))
+
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+
+
+@functools.cache
+def opaque_one() -> Any:
+    """The number one on the device."""
+    return opaque_numbers([1.0])[0]
+
+
+@functools.cache
+def _frozen_decode() -> Any:
+    import drjit as dr
+
+    from mpcam_kernels import decode
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def both(buffer: Any, unit: Any) -> tuple[Any, Any]:
+        return decode.triangles(types(), buffer), decode.depths(types(), buffer, unit)
+
+    return both

@@ -1,0 +1,192 @@
+"""The usual detour: render linear views of a cube's or half a cube's faces, then look every pixel's ray up in them."""
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.cameras.pinhole import Pinhole
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.math import PI
+from mpcam.rendering.clock import Clock
+from mpcam.rendering.device import lens, opaque_numbers, types
+from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.invert import Inverted
+
+# Right, down and forward axes of each face in the camera frame: front, +x, -x, +y, -y, back.
+_AXES = np.array(
+    [
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+        [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+        [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
+    ],
+    np.float64,
+)
+
+
+def face_cameras(camera: Camera, resolution: int, half: bool) -> list[Pinhole]:
+    """Pinholes with 90 degrees across for the faces around a camera; half: only what lies in front of its plane."""
+    cameras = []
+    for number in range(5 if half else 6):
+        pose = np.eye(4)
+        pose[:3, :3] = _AXES[number]
+        size, centre = [resolution, resolution], [0.5 * resolution, 0.5 * resolution]
+        if half and number:
+            side = 0 if number < 3 else 1
+            size[side] = (resolution + 1) // 2
+            centre[side] = 0.5 * resolution if number in (1, 3) else size[side] - 0.5 * resolution
+        focal = 0.5 * resolution
+        cameras.append(Pinhole(size[0], size[1], focal, focal, *centre, pose @ np.asarray(camera.camera_from_world)))
+    return cameras
+
+
+class Cubemapped:
+    """Frames resampled from the faces of a cube around the camera: nearest texel, so hits stay real hits."""
+
+    method = "cubemap"
+    half = False
+
+    def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
+        if isinstance(resolution, bool) or not isinstance(resolution, (int, np.integer)) or not 1 <= resolution <= 16384:
+            raise InputError(f"resolution={resolution!r}: a whole number of pixels from 1 to 16384 is needed")
+        angle = camera.domain.max_angle
+        if not camera.central or angle is None:
+            raise InputError(f"method={self.method!r} needs a camera with one centre, not {type(camera).__name__}")
+        if self.half and angle > 0.5 * PI + 1e-9:
+            raise InputError(
+                f"method='hemicube' sees 180 degrees, the camera {np.degrees(2 * angle):.0f}: use method='cubemap'"
+            )
+        self.camera, self.mesh, self.resolution = camera, mesh, int(resolution)
+        self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
+        self.lens = lens(camera)
+        self.unit = opaque_numbers([self.faces[0].device.scale])[0]
+
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the vertices."""
+        self.faces[0].update(vertices)
+        for face in self.faces[1:]:
+            face.vertices = self.faces[0].vertices
+
+    def frame(self) -> Hits:
+        """One frame, evaluated."""
+        return self._hits([face.buffer()[0] for face in self.faces])
+
+    def stages(self) -> dict[str, float]:
+        """Seconds of one frame by stage."""
+        clock = Clock()
+        buffers = [face.buffer()[0] for face in self.faces]
+        clock.done("faces", buffers)
+        self._hits(buffers)
+        clock.done("resample")
+        return clock.seconds
+
+    def _hits(self, buffers: list[Any]) -> Hits:
+        look_up = _frozen_look_up(self.resolution, self.half)
+        samples = self.lens.directions.pixels
+        triangle, depth, texel = look_up(samples, buffers, self.unit)
+        vertices = self.faces[0].vertices
+
+        def weights() -> tuple[Any, Any]:
+            import drjit as dr
+
+            from mpcam_kernels import central, decode
+
+            if self.mesh.triangle_count == 0:
+                return depth * 0.0, depth * 0.0
+            directions = _texel_directions(texel, self.resolution, self.half)
+            front = self.faces[0]  # its frame is the camera's own
+            found = decode.weights(types(), central, front.place(vertices), front.faces, triangle, directions)
+            dr.eval(found)
+            return found
+
+        def stats() -> Stats:
+            if self.mesh.triangle_count == 0:
+                return Stats(0, 0)
+            counts = np.sum([face.buffer(count=True)[1].numpy() for face in self.faces], 0)
+            return Stats(int(counts[0]), int(counts[1]))
+
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+
+
+class Hemicubed(Cubemapped):
+    """Frames resampled from the front face and the front halves of the four side faces of a cube."""
+
+    method = "hemicube"
+    half = True
+
+
+def _layout(resolution: int, half: bool) -> list[tuple[int, int, int]]:
+    """Width, height and first texel of each face."""
+    faces, start = [], 0
+    for number in range(5 if half else 6):
+        width = (resolution + 1) // 2 if half and number in (1, 2) else resolution
+        height = (resolution + 1) // 2 if half and number in (3, 4) else resolution
+        faces.append((width, height, start))
+        start += width * height
+    return faces
+
+
+def _texel(direction: Any, resolution: int, half: bool) -> Any:
+    """Number of the texel that a direction of the camera frame falls into."""
+    import drjit as dr
+
+    t = types()
+    x, y, z = direction
+    far = dr.maximum(dr.maximum(dr.maximum(abs(x), abs(y)), abs(z)), 1e-30)
+    number = dr.select(abs(x) == far, dr.select(x > 0, 1, 2), dr.select(y > 0, 3, 4))
+    number = dr.select(abs(z) == far, dr.select(z > 0, 0, 5), number)
+    result = t.UInt(0)
+    for face, (width, height, start) in enumerate(_layout(resolution, half)):
+        right, down, _ = _AXES[face]
+        u, v = (sum(float(axis[i]) * direction[i] for i in range(3) if axis[i]) / far for axis in (right, down))
+        shift_u = 0 if face != 2 else resolution - width
+        shift_v = 0 if face != 4 else resolution - height
+        column = dr.clip(t.Int(dr.floor(0.5 * resolution * (1 + u))) - shift_u, 0, width - 1)
+        row = dr.clip(t.Int(dr.floor(0.5 * resolution * (1 + v))) - shift_v, 0, height - 1)
+        result = dr.select(number == face, t.UInt(row * width + column + start), result)
+    return result
+
+
+def _texel_directions(texel: Any, resolution: int, half: bool) -> Any:
+    """Camera-frame directions (not of unit length) through texel centres."""
+    import drjit as dr
+
+    t = types()
+    result = t.Array3f(0, 0, 1)
+    for face, (width, height, start) in enumerate(_layout(resolution, half)):
+        inside = (texel >= start) & (texel < start + width * height)
+        local = dr.select(inside, texel - start, 0)
+        shift_u = 0 if face != 2 else resolution - width
+        shift_v = 0 if face != 4 else resolution - height
+        u = (t.Float(local % width + shift_u) + 0.5) * (2 / resolution) - 1
+        v = (t.Float(local // width + shift_v) + 0.5) * (2 / resolution) - 1
+        right, down, forward = _AXES[face]
+        axes = [u * float(right[i]) + v * float(down[i]) + float(forward[i]) for i in range(3)]
+        result = dr.select(inside, t.Array3f(*axes), result)
+    return result
+
+
+@functools.cache
+def _frozen_look_up(resolution: int, half: bool) -> Any:
+    import drjit as dr
+
+    from mpcam_kernels import decode
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def look_up(directions: Any, buffers: list[Any], unit: Any) -> tuple[Any, Any, Any]:
+        t = types()
+        texel = _texel(directions, resolution, half)
+        valid = dr.squared_norm(directions) > 0
+        found = t.UInt64(decode.EMPTY)
+        for buffer, (width, height, start) in zip(buffers, _layout(resolution, half), strict=True):
+            inside = valid & (texel >= start) & (texel < start + width * height)
+            found = dr.select(inside, dr.gather(t.UInt64, buffer, texel - start, inside), found)
+        return decode.triangles(t, found), decode.depths(t, found, unit), texel
+
+    return look_up

@@ -1,0 +1,181 @@
+"""Meshes and cameras on the device, prepared once and kept while they are alive."""
+
+import copy
+import dataclasses
+import functools
+import weakref
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.cameras.profiles import Profile
+from mpcam.errors import InputError, SetupError
+from mpcam.geometry.mesh import Mesh
+
+
+def types() -> Any:
+    """Dr.Jit array types of the backend in force; raises SetupError with the remedy where it cannot run."""
+    from mpcam_kernels import backend
+
+    try:
+        return backend.types()
+    except backend.BackendError as error:
+        raise SetupError(str(error)) from None
+
+
+class DeviceMesh:
+    """Vertices and faces in device memory.
+
+    Vertices are kept as (v - anchor) / scale, which fills about [-1, 1], so that float32 holds a small mesh far from
+    the world's origin, or a mesh of 1e-8 or 1e8 units, as well as any other.
+    """
+
+    def __init__(self, mesh: Mesh):
+        t = types()
+        low, high = mesh.bounds
+        extent = float(np.max(high - low)) / 2
+        self.anchor = 0.5 * low + 0.5 * high
+        self.scale = extent if extent > 0 else 1.0
+        self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
+        self.vertices = self.place(mesh.vertices)
+
+    def place(self, vertices: np.ndarray) -> Any:
+        """Other positions of the same vertices, uploaded."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            flat = ((vertices - self.anchor) / self.scale).astype(np.float32).ravel()
+        return types().Float(flat) + opaque_zero()  # in Dr.Jit's own memory: frozen kernels are particular about alignment
+
+    def pose(self, camera: Camera) -> list[Any]:
+        """Rotation (9) and shift (3) from device vertices to the camera frame in units of `scale`, opaque."""
+        matrix = np.asarray(camera.camera_from_world, np.float64)
+        shift = (matrix[:3, :3] @ self.anchor + matrix[:3, 3]) / self.scale
+        numbers = [*matrix[:3, :3].ravel(), *shift]
+        return opaque_numbers(numbers)
+
+
+def opaque_numbers(numbers: list[Any]) -> list[Any]:
+    """Numbers as one-element device arrays, so that kernels do not change when they do."""
+    import drjit as dr
+
+    t = types()
+    table = t.Float(np.array(numbers, np.float32))
+    values = [dr.gather(t.Float, table, t.UInt(i)) for i in range(len(numbers))]
+    dr.eval(values)
+    return values
+
+
+@functools.cache
+def opaque_zero() -> Any:
+    """Zero on the device, which no compiler can leave out."""
+    return opaque_numbers([0.0])[0]
+
+
+_meshes: weakref.WeakKeyDictionary[Mesh, DeviceMesh] = weakref.WeakKeyDictionary()
+
+
+def device_mesh(mesh: Mesh) -> DeviceMesh:
+    """The mesh on the device; uploaded at the first call."""
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"a mpcam.Mesh is needed, got {type(mesh).__name__}: see mpcam.load_mesh and mpcam.builtin_mesh")
+    found = _meshes.get(mesh)
+    if found is None:
+        found = DeviceMesh(mesh)
+        _meshes[mesh] = found
+    return found
+
+
+def lens_key(camera: Camera) -> tuple[Any, ...]:
+    """What decides a camera's rays in its own frame: everything but the pose."""
+    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
+    return (type(camera), *(getattr(camera, name) for name in names if name != "camera_from_world"))
+
+
+def device_lens(camera: Camera) -> Camera:
+    """The camera at the identity pose with its numbers on the device, for use inside of kernels."""
+    lens = copy.copy(camera)
+    object.__setattr__(lens, "camera_from_world", None)
+    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
+    numbers = [n for n in names if n not in (*camera.static_fields, "camera_from_world")]
+    for name, value in zip(numbers, opaque_numbers([float(getattr(camera, n)) for n in numbers]), strict=True):
+        object.__setattr__(lens, name, value)
+    return lens
+
+
+class Lens:
+    """Rays and kernels' view of a camera, which hold for every pose of it."""
+
+    def __init__(self, camera: Camera):
+        from mpcam_kernels import samples
+
+        self.on_device = device_lens(camera)
+        t = types()
+        try:
+            self.ray = self.on_device.local_ray(samples.pixel_centres(t, camera.width, camera.height))
+            import drjit as dr
+
+            dr.eval(self.ray)
+        except TypeError as error:
+            profile = getattr(camera, "profile", None)
+            if isinstance(profile, Profile):
+                raise InputError(
+                    f"profile {profile.name!r} does not run on Dr.Jit arrays ({error}): write it with mpcam.math functions"
+                ) from None
+            raise
+
+    @functools.cached_property
+    def directions(self) -> Any:
+        """Samples of a central camera."""
+        from mpcam_kernels import samples
+
+        return samples.central_samples(types(), lambda _: self.ray, self.on_device.width, self.on_device.height)
+
+    @functools.cached_property
+    def centres(self) -> Any:
+        """Samples of the image plane, for straight-edged triangles."""
+        from mpcam_kernels import samples
+
+        return samples.planar_samples(types(), self.on_device.width, self.on_device.height, self.ray.valid)
+
+
+@functools.lru_cache(maxsize=16)
+def _lens(key: tuple[Any, ...], backend: str, holder: "_Held") -> Lens:
+    return Lens(holder.camera)
+
+
+class _Held:
+    """Carries a camera past the cache's key: all holders are equal."""
+
+    def __init__(self, camera: Camera):
+        self.camera = camera
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def lens(camera: Camera) -> Lens:
+    """Rays of a camera's pixels on the device; the sixteen used last are kept."""
+    from mpcam_kernels.backend import backend_name
+
+    return _lens(lens_key(camera), backend_name(), _Held(camera))
+
+
+def to_camera(pose: list[Any], vertices: Any, count: Any) -> Any:
+    """Device vertices numbered by `count` in the camera frame, in units of the mesh's scale."""
+    import drjit as dr
+
+    t = types()
+    x, y, z = dr.gather(t.Array3f, vertices, count)
+    rows = [pose[3 * i] * x + pose[3 * i + 1] * y + pose[3 * i + 2] * z + pose[9 + i] for i in range(3)]
+    return t.Array3f(*rows)
+
+
+def flat(target: Any, vector: Any, index: Any) -> Any:
+    """Component-first vectors to one array of 3 numbers per item, written over `target`."""
+    import drjit as dr
+
+    dr.scatter(target, vector, index)
+    return target

@@ -1,0 +1,95 @@
+"""What a camera sees first, pixel by pixel."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.geometry.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Stats:
+    """How much work a frame took.
+
+    tests: pixels tested against triangles. rendered: tests that hit, before the nearest one was chosen.
+    """
+
+    tests: int
+    rendered: int
+
+    @property
+    def overdraw(self) -> float:
+        """Tests per rendered fragment; 1 is ideal. Zero where nothing was tested, infinite where nothing was hit."""
+        if self.tests == 0:
+            return 0.0
+        return self.tests / self.rendered if self.rendered else float("inf")
+
+
+class Hits:
+    """First hits of a camera's pixels on a mesh; every field is worked out when it is first asked for.
+
+    triangle: (H, W) int32 face numbers, -1 where nothing is hit. depth: (H, W) float32 distance along the pixel's ray
+    (unit direction), scene units, infinite where nothing is hit. barycentric: (H, W, 2) float32 weights of the
+    triangle's second and third corner (the first has the rest to 1), 0 where nothing is hit. stats: work counts.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        mesh: Mesh,
+        method: str,
+        triangle: Any,
+        depth: Any,
+        weights: Callable[[], tuple[Any, Any]],
+        stats: Callable[[], Stats],
+    ):
+        self.camera, self.mesh, self.method = camera, mesh, method
+        self.device_triangle, self.device_depth = triangle, depth
+        self._weights, self._stats = weights, stats
+
+    @cached_property
+    def device_weights(self) -> tuple[Any, Any]:
+        """Barycentric weights of corners 2 and 3 on the device, one number per pixel."""
+        return self._weights()
+
+    @cached_property
+    def triangle(self) -> np.ndarray:
+        """(H, W) int32, -1 where nothing is hit."""
+        return self._image(self.device_triangle)
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        """(H, W) float32, infinite where nothing is hit."""
+        return self._image(self.device_depth)
+
+    @cached_property
+    def barycentric(self) -> np.ndarray:
+        """(H, W, 2) float32, weights of the second and third corner."""
+        return np.stack([self._image(weight) for weight in self.device_weights], -1)
+
+    @cached_property
+    def stats(self) -> Stats:
+        """Work counts; counted in a second run when they are asked for. Zero for methods that test no pixels."""
+        return self._stats()
+
+    @property
+    def mask(self) -> np.ndarray:
+        """(H, W) bool, where something is hit."""
+        return self.triangle >= 0
+
+    @property
+    def points(self) -> np.ndarray:
+        """(H, W, 3) float64 world positions of the hits, from the barycentric weights; 0 where nothing is hit."""
+        from mpcam.rendering.interpolate import interpolate
+
+        return interpolate(self, self.mesh.vertices)
+
+    def _image(self, values: Any) -> np.ndarray:
+        return np.asarray(values.numpy()).reshape(self.camera.height, self.camera.width)
+
+    def __repr__(self) -> str:
+        return f"Hits({self.camera.width}x{self.camera.height}, method={self.method!r}, {self.mesh.triangle_count} triangles)"

@@ -1,0 +1,93 @@
+"""The methods by name, and the two calls that most users need: `rasterize` and `render`."""
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.scene import Scene
+from mpcam.rendering.hits import Hits
+from mpcam.rendering.shade import shade
+
+METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
+
+
+class Prepared(Protocol):
+    """One camera, mesh and method, ready to give frames."""
+
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the mesh's vertices, world frame."""
+        ...
+
+    def frame(self) -> Hits:
+        """One frame, evaluated on the device."""
+        ...
+
+    def stages(self) -> dict[str, float]:
+        """Seconds of one frame by stage."""
+        ...
+
+
+def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Prepared:
+    """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
+
+    settings: `bound` ("tight") for invert; `level` (0 to 7) for vertex; `resolution` (pixels per face) for cubemap and
+    hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where a method cannot serve
+    the camera.
+    """
+    if not isinstance(camera, Camera):
+        raise InputError(f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid")
+    if isinstance(mesh, Scene):
+        mesh = mesh.mesh
+    kinds = {"invert": ("bound",), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
+    if method not in METHODS:
+        raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
+    allowed = kinds.get(method, ())
+    for name in settings:
+        if name not in allowed:
+            raise InputError(f"method={method!r} has no setting {name!r}: allowed are {', '.join(allowed) or 'none'}")
+    return _kind(method)(camera, mesh, **settings)
+
+
+def _kind(method: str) -> Any:
+    """The class of a method; each is imported only when it is asked for."""
+    if method == "invert":
+        from mpcam.rendering.invert import Inverted
+
+        return Inverted
+    if method == "vertex":
+        from mpcam.rendering.vertex import VertexProjected
+
+        return VertexProjected
+    if method == "raytrace":
+        from mpcam.truth.raytrace import RayTraced
+
+        return RayTraced
+    from mpcam.rendering.cubemap import Cubemapped, Hemicubed
+
+    return Cubemapped if method == "cubemap" else Hemicubed
+
+
+def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Hits:
+    """First hits of every pixel's ray on a mesh.
+
+    camera: any of mpcam's cameras. mesh: a Mesh, or a Scene (its meshes as one). method: "invert" (exact: bounds each
+    curved triangle and inverts per pixel), "vertex" (projected vertices, straight edges), "cubemap", "hemicube"
+    (resampled linear views), "raytrace" (Mitsuba). settings: see `prepare`. Returns Hits with triangle (H, W),
+    barycentric (H, W, 2), depth (H, W); fields that are not asked for cost nothing. Raises InputError.
+    """
+    return prepare(camera, mesh, method, **settings).frame()
+
+
+def render(
+    camera: Camera, scene: Any, method: str = "invert", *, shading: str = "light", **settings: Any
+) -> np.ndarray:
+    """An image: (H, W, 3) float32, linear RGB.
+
+    scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). method
+    and settings: see `rasterize`. Raises InputError.
+    """
+    whole = Scene.of(scene)
+    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading)

@@ -1,0 +1,229 @@
+"""Colours of first hits: one kernel that gathers what the chosen shading needs, and nothing else."""
+
+import functools
+import weakref
+from typing import Any
+
+import numpy as np
+
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
+from mpcam.rendering.device import lens, opaque_numbers, types
+from mpcam.rendering.hits import Hits
+
+SHADINGS = ("color", "normal", "texture", "light")
+
+
+class Attributes:
+    """What shading reads of a mesh, on the device, uploaded on first use."""
+
+    def __init__(self, mesh: Mesh):
+        # The table must not keep its own key alive: only arrays of the mesh are held, not the mesh.
+        self._faces, self._normals, self._uv, self._colors = mesh.faces, mesh.normals, mesh.uv, mesh.colors
+        self._face_normals, self._materials, self._face_material = mesh.face_normals, mesh.materials, mesh.face_material
+        self.smooth, self.textured = mesh.normals is not None, any(m.texture is not None for m in mesh.materials)
+        self.textured = self.textured and mesh.uv is not None
+        self.tinted = mesh.colors is not None
+
+    @functools.cached_property
+    def faces(self) -> Any:
+        return types().UInt(self._faces.ravel().astype(np.uint32))
+
+    @functools.cached_property
+    def normals(self) -> Any:
+        """3 numbers per vertex, or per face where the mesh has no shading normals."""
+        return _upload(self._normals if self._normals is not None else self._face_normals)
+
+    @functools.cached_property
+    def uv(self) -> Any:
+        return _upload(self._uv)
+
+    @functools.cached_property
+    def colors(self) -> Any:
+        return _upload(self._colors)
+
+    @functools.cached_property
+    def material(self) -> Any:
+        numbers = np.zeros(len(self._faces), np.uint32) if self._face_material is None else self._face_material
+        return types().UInt(numbers.astype(np.uint32))
+
+    @functools.cached_property
+    def base(self) -> Any:
+        """3 numbers per material."""
+        return _upload(np.array([material.color for material in self._materials]))
+
+    @functools.cached_property
+    def textures(self) -> tuple[Any, Any]:
+        """All texels one after another (3 numbers each), and per material: first texel, width, height (0: none)."""
+        table, texels, start = [], [np.zeros((1, 3), np.float32)], 1
+        for material in self._materials:
+            if material.texture is None:
+                table.append((0, 0, 0))
+                continue
+            height, width, _ = material.texture.shape
+            table.append((start, width, height))
+            texels.append(material.texture.reshape(-1, 3))
+            start += width * height
+        return _upload(np.concatenate(texels)), types().UInt(np.array(table, np.uint32).ravel())
+
+
+def _upload(values: Any) -> Any:
+    return types().Float(np.ascontiguousarray(values, np.float32).ravel())
+
+
+_attributes: weakref.WeakKeyDictionary[Mesh, Attributes] = weakref.WeakKeyDictionary()
+
+
+def attributes(mesh: Mesh) -> Attributes:
+    """The shading attributes of a mesh on the device."""
+    found = _attributes.get(mesh)
+    if found is None:
+        found = _attributes[mesh] = Attributes(mesh)
+    return found
+
+
+def shade(hits: Hits, scene: Any = None, shading: str = "light") -> np.ndarray:
+    """Colours of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
+
+    scene: the Scene (or Mesh) that the hits were made with; default: the hits' mesh. shading: "color" (material and
+    vertex colour), "texture" (the same times the texture), "normal" (world shading normal towards the viewer, 0.5 +
+    0.5 n), "light" (texture, lit: Lambert's law, both sides, ambient, no shadows; without lights, one at the viewer).
+    Raises InputError for another shading, or a scene whose mesh the hits do not belong to.
+    """
+    whole = Scene.of(hits.mesh if scene is None else scene)
+    if shading not in SHADINGS:
+        raise InputError(f"shading={shading!r}: allowed are {', '.join(SHADINGS)}")
+    if whole.mesh.triangle_count != hits.mesh.triangle_count:
+        raise InputError(
+            f"the scene has {whole.mesh.triangle_count} triangles and the hits are on {hits.mesh.triangle_count}: "
+            "give the scene that was rasterized"
+        )
+    colour = shade_device(hits, whole, shading)
+    return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
+
+
+def shade_device(hits: Hits, scene: Scene, shading: str = "light") -> Any:
+    """As `shade`, but the colours stay on the device: an evaluated Array3f, one entry per pixel."""
+    import drjit as dr
+
+    t = types()
+    background = opaque_numbers(list(scene.background))
+    if hits.mesh.triangle_count == 0:
+        colour = t.Array3f(*background) + hits.device_depth * 0.0
+        colour = dr.select(dr.isfinite(colour), colour, t.Array3f(*background))
+        dr.eval(colour)
+        return colour
+    table, weights = attributes(scene.mesh), hits.device_weights
+    data: dict[str, Any] = {"faces": table.faces, "background": background}
+    if shading != "normal":
+        data |= {"material": table.material, "base": table.base}
+        data |= {"colors": table.colors} if table.tinted else {}
+        if shading != "color" and table.textured:
+            data["texels"], data["textures"] = table.textures
+            data["uv"] = table.uv
+    if shading in ("normal", "light"):
+        ray = lens(hits.camera).ray
+        pose = opaque_numbers([*np.asarray(hits.camera.camera_from_world, np.float64)[:3, :3].ravel()])
+        data |= {"normals": table.normals, "pose": pose, "direction": ray.direction}
+    kinds: tuple[str, ...] = ()
+    if shading == "light":
+        kinds = tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
+        data["ambient"] = opaque_numbers(list(scene.ambient))
+        data["lights"] = [_light_numbers(light, hits) for light in scene.lights]
+        if "point" in kinds:
+            data["origin"], data["depth"] = ray.origin, hits.device_depth  # pyright: ignore[reportPossiblyUnboundVariable]
+    kernel = _kernel(shading, kinds, table.smooth)
+    return kernel(hits.device_triangle, weights, data)
+
+
+def _light_numbers(light: Any, hits: Hits) -> list[Any]:
+    """Direction to the light (world) or position (camera frame), then its strength."""
+    if isinstance(light, DirectionalLight):
+        return opaque_numbers([*(-np.asarray(light.direction)), *light.radiance])
+    assert isinstance(light, PointLight)
+    matrix = np.asarray(hits.camera.camera_from_world)
+    return opaque_numbers([*(matrix[:3, :3] @ light.position + matrix[:3, 3]), *light.intensity])
+
+
+@functools.cache
+def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
+    """The frozen kernel of a shading, a row of lights, and a kind of normals."""
+    import drjit as dr
+
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def kernel(triangle: Any, weights: Any, data: dict[str, Any]) -> Any:
+        t = types()
+        hit = triangle >= 0
+        face = t.UInt(dr.maximum(triangle, 0))
+        corners = dr.gather(t.Array3u, data["faces"], face, hit)
+        mix = (1 - weights[0] - weights[1], weights[0], weights[1])
+
+        def mixed(kind: Any, values: Any) -> Any:
+            return sum(dr.gather(kind, values, corner, hit) * weight for corner, weight in zip(corners, mix, strict=True))
+
+        colour, normal = t.Array3f(1.0), None
+        if shading != "normal":
+            material = dr.gather(t.UInt, data["material"], face, hit)
+            colour = dr.gather(t.Array3f, data["base"], material, hit)
+            if "colors" in data:
+                colour *= mixed(t.Array3f, data["colors"])
+            if "uv" in data:
+                colour *= _texture(t, data, material, mixed(t.Array2f, data["uv"]), hit)
+        if shading in ("normal", "light"):
+            normal = mixed(t.Array3f, data["normals"]) if smooth else dr.gather(t.Array3f, data["normals"], face, hit)
+            normal *= dr.rsqrt(dr.maximum(dr.squared_norm(normal), 1e-30))
+            pose, d = data["pose"], data["direction"]
+            back = t.Array3f(*(-(pose[i] * d[0] + pose[3 + i] * d[1] + pose[6 + i] * d[2]) for i in range(3)))
+            normal = dr.select(dr.dot(normal, back) < 0, -normal, normal)
+            if shading == "normal":
+                colour = 0.5 + 0.5 * normal
+            elif not lights:
+                colour *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
+            else:
+                colour *= _lit(t, data, lights, normal)
+        return dr.select(hit, colour, t.Array3f(*data["background"]))
+
+    return kernel
+
+
+def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> Any:
+    """Bilinear look-up with repetition; v runs up, texture rows run down. White where a material has no texture."""
+    import drjit as dr
+
+    start, width, height = dr.gather(t.Array3u, data["textures"], material, hit)
+    some = hit & (width > 0)
+    columns, rows = t.Int(dr.maximum(width, 1)), t.Int(dr.maximum(height, 1))
+    u, v = uv.x - dr.floor(uv.x), 1.0 - (uv.y - dr.floor(uv.y))
+    x, y = u * t.Float(columns) - 0.5, v * t.Float(rows) - 0.5
+    left, top = t.Int(dr.floor(x)), t.Int(dr.floor(y))
+    fx, fy = x - t.Float(left), y - t.Float(top)
+
+    def texel(i: int, j: int) -> Any:
+        column, row = left + i, top + j
+        column = dr.select(column < 0, column + columns, dr.select(column >= columns, column - columns, column))
+        row = dr.select(row < 0, row + rows, dr.select(row >= rows, row - rows, row))
+        return dr.gather(t.Array3f, data["texels"], start + t.UInt(row * columns + column), some)
+
+    upper, lower = texel(0, 0) * (1 - fx) + texel(1, 0) * fx, texel(0, 1) * (1 - fx) + texel(1, 1) * fx
+    return dr.select(some, upper * (1 - fy) + lower * fy, 1.0)
+
+
+def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any) -> Any:
+    """Light that arrives, for a white surface: ambient and Lambert's law for each light."""
+    import drjit as dr
+
+    total = t.Array3f(*data["ambient"])
+    for kind, numbers in zip(lights, data["lights"], strict=True):
+        place, strength = t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:])
+        if kind == "directional":
+            total += strength * dr.maximum(dr.dot(normal, place), 0)
+            continue
+        origin, direction, pose = data["origin"], data["direction"], data["pose"]
+        away = [place[i] - (origin[i] + direction[i] * data["depth"]) for i in range(3)]  # camera frame
+        world = t.Array3f(*(pose[i] * away[0] + pose[3 + i] * away[1] + pose[6 + i] * away[2] for i in range(3)))
+        squared = dr.maximum(dr.squared_norm(world), 1e-30)
+        total += strength * dr.maximum(dr.dot(normal, world), 0) * dr.rsqrt(squared) / squared
+    return total

@@ -1,0 +1,133 @@
+"""The usual approximation: project vertices, join them by straight edges, interpolate linearly in the image."""
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.rendering.buffered import Buffered
+from mpcam.rendering.device import flat, to_camera, types
+
+MOST_LEVELS = 7
+MOST_TRIANGLES = 1 << 26
+
+
+class VertexProjected(Buffered):
+    """Frames by projected vertices; each edge of the mesh is split 2**level times first.
+
+    Depth and barycentric weights are linear in the image, as a game's vertex shader would have them. Small triangles
+    with a corner that has no image at all are left out; a corner beyond the rim is projected as far as f goes on.
+    """
+
+    method = "vertex"
+
+    def __init__(self, camera: Camera, mesh: Mesh, level: int = 0):
+        if isinstance(level, bool) or not isinstance(level, (int, np.integer)) or not 0 <= level <= MOST_LEVELS:
+            raise InputError(f"level={level!r}: a whole number from 0 to {MOST_LEVELS} is needed (edges split 2**level times)")
+        total = mesh.triangle_count * 4**level
+        if total > MOST_TRIANGLES:
+            raise InputError(f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}")
+        super().__init__(camera, mesh, curved=False)
+        self.level = int(level)
+        self.parts = Parts(2**self.level)
+        self.corners = self.faces  # of the whole triangles
+        self.faces = self.parts.faces(self.corners, mesh.triangle_count)
+
+    def place(self, vertices: Any) -> Any:
+        import drjit as dr
+
+        points = self.parts.points * self.mesh.triangle_count if self.level else dr.width(vertices) // 3
+        number = dr.arange(types().UInt, points)
+        dr.make_opaque(number)
+        target = dr.empty(types().Float, 3 * points)
+        place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
+        data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)
+        return place(number, target, self.parts.grid, *data)
+
+    def parent(self, triangle: Any) -> Any:
+        import drjit as dr
+
+        parent = dr.select(triangle >= 0, triangle // self.parts.count, -1)
+        dr.eval(parent)
+        return parent
+
+    def parent_weights(self, triangle: Any, second: Any, third: Any) -> tuple[Any, Any]:
+        return self.parts.parent_weights(triangle, second, third)
+
+
+@functools.cache
+def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
+    """Kernel that makes the tessellation's vertices and projects them to (pixel, depth); NaN where there is no image."""
+    import drjit as dr
+
+    from mpcam_kernels.frozen import frozen
+
+    central = model.central
+
+    @frozen
+    def place(
+        number: Any, target: Any, grid: Any, camera: Any, pose: list[Any], unit: Any, vertices: Any, faces: Any
+    ) -> Any:
+        if level == 0:
+            point = to_camera(pose, vertices, number)
+        else:
+            points = (2**level + 1) * (2**level + 2) // 2
+            corners = dr.gather(types().Array3u, faces, number // points)
+            second, third = dr.gather(types().Array2f, grid, number % points)
+            a, b, c = (to_camera(pose, vertices, corner) for corner in corners)
+            point = a + (b - a) * second + (c - a) * third
+        point = point * unit if not central else point
+        pixel, inside = camera.local_image(point)
+        depth = dr.norm(point) * unit if central else point.z
+        # Behind a pinhole there is no image; beyond the rim of a disc there is one, as far as f goes on.
+        depth = dr.select(inside, depth, dr.nan) if unbounded and central else depth
+        return flat(target, types().Array3f(pixel.x, pixel.y, depth), number)
+
+    return place
+
+
+class Parts:
+    """A triangle cut into divisions**2 equal parts: grid points row by row, from the first corner to the other two.
+
+    grid: weights of corners 2 and 3 at the grid points. count: parts per triangle. points: grid points per triangle.
+    """
+
+    def __init__(self, divisions: int):
+        rows = [(row, column) for row in range(divisions + 1) for column in range(row + 1)]
+        number = {place: count for count, place in enumerate(rows)}
+        parts = []
+        for row in range(divisions):
+            for column in range(row + 1):
+                parts.append([number[row, column], number[row + 1, column], number[row + 1, column + 1]])
+                if column < row:
+                    parts.append([number[row, column], number[row + 1, column + 1], number[row, column + 1]])
+        t = types()
+        self.count, self.points = len(parts), len(rows)
+        self.grid = t.Array2f(np.array([((r - c) / divisions, c / divisions) for r, c in rows], np.float32).T)
+        self._pattern = t.UInt(np.array(parts, np.uint32).ravel())
+
+    def faces(self, faces: Any, triangles: int) -> Any:
+        """Vertex numbers of all parts of all triangles."""
+        import drjit as dr
+
+        if self.count == 1 or triangles == 0:
+            return faces
+        number = dr.arange(types().UInt, 3 * self.count * triangles)
+        offset = (number // (3 * self.count)) * self.points
+        result = dr.gather(types().UInt, self._pattern, number % (3 * self.count)) + offset
+        dr.eval(result)
+        return result
+
+    def parent_weights(self, part: Any, second: Any, third: Any) -> tuple[Any, Any]:
+        """Weights of corners 2 and 3 of the whole triangle, from those of a part (-1: none)."""
+        import drjit as dr
+
+        t = types()
+        within = t.UInt(dr.maximum(part, 0)) % self.count
+        corners = [dr.gather(t.UInt, self._pattern, 3 * within + i) for i in range(3)]
+        a, b, c = (dr.gather(t.Array2f, self.grid, corner) for corner in corners)
+        mixed = a * (1 - second - third) + b * second + c * third
+        return dr.select(part >= 0, mixed.x, 0.0), dr.select(part >= 0, mixed.y, 0.0)

@@ -1,0 +1,104 @@
+"""First hits by Mitsuba and Embree: the truth for `Hits`, and the rival on speed."""
+
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.geometry.mesh import Mesh
+from mpcam.rendering.clock import Clock
+from mpcam.rendering.device import DeviceMesh, device_mesh, lens, types
+from mpcam.rendering.hits import Hits, Stats
+from mpcam.truth.meshes import mitsuba_mesh, move, position_key
+from mpcam.truth.variant import mitsuba
+
+
+class RayTraced:
+    """Frames by tracing each pixel's ray through a tree over the triangles.
+
+    The same rays and the same float32 vertices as the kernels use. Triangles with a corner that is not finite, or
+    without area, are left out of the tree, which may not hold such numbers.
+    """
+
+    method = "raytrace"
+
+    def __init__(self, camera: Camera, mesh: Mesh):
+        import drjit as dr
+
+        self.camera, self.mesh = camera, mesh
+        self.device: DeviceMesh = device_mesh(mesh)
+        with np.errstate(invalid="ignore", over="ignore"):
+            finite = np.isfinite(mesh.corners).all(axis=(1, 2))
+        self._kept = None if finite.all() else types().UInt(np.flatnonzero(finite).astype(np.uint32))
+        faces = mesh.faces if self._kept is None else mesh.faces[finite]
+        self._empty = len(faces) == 0
+        with mitsuba() as mi:
+            origin, direction, valid = lens(camera).ray
+            pose = self.device.pose(camera)
+            scale = 1.0 / self.device.scale
+            moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
+            columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
+            world = [mi.Float(sum(columns[i][j] * moved[j] for j in range(3))) for i in range(3)]
+            along = [mi.Float(sum(columns[i][j] * direction[j] for j in range(3))) for i in range(3)]
+            self._ray = mi.Ray3f(mi.Point3f(*world), mi.Vector3f(*along))
+            self._valid = mi.Bool(valid)
+            dr.eval(self._ray, self._valid)
+            self._scene = self._parameters = None
+            if not self._empty:
+                positions = dr.select(dr.isfinite(self.device.vertices), self.device.vertices, 0.0)
+                shape = mitsuba_mesh(mi, "mesh", positions, faces)
+                self._scene = mi.load_dict({"type": "scene", "mesh": shape})
+                self._parameters = mi.traverse(self._scene)
+                self._key = position_key(self._parameters)
+
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the vertices: uploads them and rebuilds the tree."""
+        import drjit as dr
+
+        if self._empty:
+            return
+        with mitsuba() as mi:
+            positions = self.device.place(np.asarray(vertices))
+            move(self._parameters, self._key, mi.Float(dr.select(dr.isfinite(positions), positions, 0.0)))
+
+    def frame(self) -> Hits:
+        """One frame, evaluated."""
+        import drjit as dr
+
+        t = types()
+        with mitsuba() as mi:
+            if self._scene is None:
+                count = self.camera.width * self.camera.height
+                triangle, depth = dr.full(t.Int, -1, count), dr.full(t.Float, dr.inf, count)
+                second, third = dr.zeros(t.Float, count), dr.zeros(t.Float, count)
+            else:
+                found = self._scene.ray_intersect_preliminary(self._ray, coherent=True, active=self._valid)
+                hit = self._valid & found.is_valid()
+                number = t.UInt(dr.detach(found.prim_index))
+                if self._kept is not None:
+                    number = dr.gather(t.UInt, self._kept, number, t.Bool(hit))
+                triangle = dr.select(t.Bool(hit), t.Int(number), -1)
+                depth = dr.select(t.Bool(hit), t.Float(dr.detach(found.t)) * self.device.scale, dr.inf)
+                second, third = (dr.select(t.Bool(hit), t.Float(dr.detach(w)), 0.0) for w in found.prim_uv)
+            dr.eval(triangle, depth, second, third)
+            del mi
+        return Hits(
+            self.camera, self.mesh, self.method, triangle, depth, lambda: (second, third), lambda: Stats(0, 0)
+        )
+
+    def stages(self) -> dict[str, float]:
+        """Seconds of building the tree and of tracing, each with the device at rest before and after.
+
+        The tree is built by the first ray that needs it, so building is what a frame after a change takes longer.
+        """
+        if self._scene is None:
+            return {"build": 0.0, "trace": 0.0}
+        clock = Clock()
+        with mitsuba():
+            move(self._parameters, self._key, self._parameters[self._key] + 0.0)
+        self.frame()
+        clock.done("build")
+        self.frame()
+        clock.done("trace")
+        clock.seconds["build"] = max(0.0, clock.seconds["build"] - clock.seconds["trace"])
+        return clock.seconds
