@@ -45,9 +45,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "mpcam.cameras": (
-        "Box Camera Domain Orthographic Pinhole Profile Projection Radial Ray custom_profile look_at"
-    ),
+    "mpcam.cameras": ("Box Camera Domain Orthographic Pinhole Profile Projection Radial Ray custom_profile look_at"),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
     "mpcam.errors": "InputError SetupError",

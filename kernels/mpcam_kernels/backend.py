@@ -29,7 +29,9 @@ def load(name: str) -> ModuleType:
         if problem:
             raise BackendError(f"{problem}: {REMEDY}")
     if not drjit.has_backend(kind):
-        raise BackendError(f"Dr.Jit finds no {name.upper()} device: unset {VARIABLE} to use LLVM, or see 'mpcam doctor'")
+        raise BackendError(
+            f"Dr.Jit finds no {name.upper()} device: unset {VARIABLE} to use LLVM, or see 'mpcam doctor'"
+        )
     return importlib.import_module(f"drjit.{name}")
 
 

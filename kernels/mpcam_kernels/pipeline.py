@@ -78,9 +78,7 @@ class Pipeline:
         triangles = dr.arange(types.UInt, dr.width(faces) // 3)
         dr.make_opaque(buffer, triangles)
         lists = [dr.empty(types.UInt, dr.width(triangles)) for _ in range(3)]
-        buffer, large, counters = self._triangles(
-            triangles, camera, positions, faces, samples, buffer, counters, lists
-        )
+        buffer, large, counters = self._triangles(triangles, camera, positions, faces, samples, buffer, counters, lists)
         if done:
             done("triangles", (buffer, large))
         total = large.count[0]
@@ -136,7 +134,7 @@ class Pipeline:
         slot = dr.scatter_inc(count, types.UInt(0), large)
         for target, value in zip(lists, (triangle, x0 | (x1 << 16), y0 | (y1 << 16)), strict=True):
             dr.scatter(target, types.UInt(value), slot, large)
-        return buffer, Large(*lists, count), counters
+        return buffer, Large(lists[0], lists[1], lists[2], count), counters
 
     def _pair_pass(
         self, lanes: Any, positions: Any, faces: Any, samples: Samples, large: Large, pairs: list[Any]
@@ -157,7 +155,7 @@ class Pipeline:
             spread = dr.gather(types.Float, samples.spreads, block)
             centre = dr.gather(type(samples.centres), samples.centres, block)
             keep = (spread >= 0) & self.test.may_hit(shape, centre, spread)
-            slot = dr.scatter_inc(found, types.UInt(0), keep)
+            slot: Any = dr.scatter_inc(found, types.UInt(0), keep)
             fits = keep & (slot < PAIRS)
             dr.scatter(pairs[0], item, slot, fits)
             dr.scatter(pairs[1], block, slot, fits)

@@ -68,7 +68,7 @@ def image_and_slopes(camera: RadialCamera, p: Vector, *velocities: Vector) -> tu
     rho = sqrt(where(off_axis, squared, 1.0))
     ex, ey = where(off_axis, x / rho, 1.0), where(off_axis, y / rho, 0.0)
     theta = atan2(sqrt(squared), z)
-    reach = where(theta < camera.profile.limit, theta, 0.999999 * camera.profile.limit)
+    reach = minimum(theta, camera.profile.reach)
     scale = camera.pixels_per_radius
     r, slope = scale * camera.profile.radius(reach), scale * camera.profile.slope(reach)
     flat = slope / where(z > 0, z, 1.0)
@@ -108,19 +108,23 @@ def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
         pixel, slopes, _ = image_and_slopes(camera, point, velocity)
         return pixel, slopes[0]
 
-    step = span / _PIECES
+    # Between its highest and its lowest point an arc turns by less than half a turn: no extremum hides between two.
+    half = _PIECES // 2
+    split = _extreme_height(a, tangent, start, span)
+    nodes = [start + (split - start) * (k / half) for k in range(half)]
+    nodes += [split + (start + span - split) * (k / half) for k in range(half + 1)]
     pixel, slope = at(start)
     low, high = [pixel[0], pixel[1]], [pixel[0], pixel[1]]
-    brackets = {(i, sign): (start, start, step < 0) for i in (0, 1) for sign in (-1, 1)}
-    for k in range(1, _PIECES + 1):
-        s, before = start + k * step, slope
+    brackets = {(i, sign): (start, start, span < 0) for i in (0, 1) for sign in (-1, 1)}
+    for previous, s in zip(nodes[:-1], nodes[1:], strict=True):
+        before = slope
         pixel, slope = at(s)
         for i in (0, 1):
             low[i], high[i] = minimum(low[i], pixel[i]), maximum(high[i], pixel[i])
             for sign in (-1, 1):
                 turns = (sign * before[i] > 0) & (sign * slope[i] < 0)
                 left, right, found = brackets[i, sign]
-                brackets[i, sign] = (where(turns, s - step, left), where(turns, s, right), found | turns)
+                brackets[i, sign] = (where(turns, previous, left), where(turns, s, right), found | turns)
     for (i, sign), (left, right, found) in brackets.items():
         for _ in range(_HALVINGS):
             middle = 0.5 * (left + right)
@@ -133,9 +137,28 @@ def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
         else:
             low[i] = minimum(low[i], where(found, limit, low[i]))
     centre = (camera.cx, camera.cy)
+    twice = twice | _through_antipode(camera, a[2] * cos(split) + tangent[2] * sin(split))
     low = [where(twice, centre[i] - camera.radius, low[i]) for i in (0, 1)]
     high = [where(twice, centre[i] + camera.radius, high[i]) for i in (0, 1)]
     return Box(vector(*low), vector(*high), valid)
+
+
+def _extreme_height(a: Vector, tangent: Vector, start: Array, span: Array) -> Array:
+    """Where an arc is farthest from or nearest to the camera plane; its middle where that lies outside of the arc."""
+    ahead = atan2(tangent[2], a[2]) - start  # of the highest point; the lowest is half a turn on
+    for _ in range(2):
+        ahead = where(ahead < 0, ahead + PI, ahead)
+    ahead = where(ahead >= PI, ahead - PI, ahead)
+    return start + where(ahead < span, ahead, 0.5 * span)
+
+
+def _through_antipode(camera: RadialCamera, height: Array) -> Array:
+    """Whether an arc of this lowest height passes so near the point behind the eye that its azimuth is undefined.
+
+    That point is the whole rim of a view of 360 degrees.
+    """
+    near = 1e-6 if epsilon(height) > 1e-10 else 1e-12
+    return (height <= near - 1) & (0.5 * camera.fov + 0.0 * height >= PI - 2 * near**0.5)
 
 
 def _visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array) -> tuple[Array, Array, Array, Array]:
@@ -222,6 +245,8 @@ def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) ->
     if not camera.profile.convex:
         return Box(sector.low, sector.high, sector.valid & finite)
     images, tangents, inside = [], [], finite
+    # An edge of at most 45 degrees between corners nearer than 153 degrees keeps away from the point behind the eye.
+    furthest = min(0.95 * camera.profile.limit, 0.85 * PI)
     for k in range(3):
         after, before = corners[(k + 1) % 3], corners[(k + 2) % 3]
         forward = vector(*(after[i] - corners[k][i] for i in range(3)))
@@ -229,7 +254,7 @@ def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) ->
         pixel, slopes, theta = image_and_slopes(camera, corners[k], forward, backward)
         images.append(pixel)
         tangents.append(slopes)
-        inside = inside & (theta < minimum(0.5 * camera.fov, 0.95 * camera.profile.limit)) & (dot(corners[k], after) > 0.7)
+        inside = inside & (theta < minimum(0.5 * camera.fov, furthest)) & (dot(corners[k], after) > 0.7)
     low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
     high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
     for k in range(3):

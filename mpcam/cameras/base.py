@@ -13,7 +13,12 @@ import numpy as np
 from mpcam.cameras.pose import as_pose
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
-from mpcam.math import Array, Vector, library, rotate, rotate_back, translation, vector
+from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
+
+
+def _quiet() -> np.errstate:
+    """No warnings from NumPy: NaN and infinity are expected, and masked."""
+    return np.errstate(invalid="ignore", over="ignore")
 
 
 def _components(values: Array, count: int, name: str) -> Vector:
@@ -29,7 +34,9 @@ def _components(values: Array, count: int, name: str) -> Vector:
         try:
             array = np.asarray(values, np.float64)
         except (TypeError, ValueError):
-            raise InputError(f"{name}: numbers of shape (..., {count}) are needed, got {type(values).__name__}") from None
+            raise InputError(
+                f"{name}: numbers of shape (..., {count}) are needed, got {type(values).__name__}"
+            ) from None
     if array.ndim == 0 or array.shape[-1] != count:
         raise InputError(f"{name} has shape {array.shape}: the last axis must have length {count}")
     return np.moveaxis(array, -1, 0) if kind == "numpy" else jnp.moveaxis(array, -1, 0)
@@ -80,7 +87,8 @@ class Camera:
         Dr.Jit: an Array2f in, Array3f out. Raises InputError when the last axis is not 2.
         """
         register_pytrees()
-        origin, direction, valid = self.local_ray(_components(pixel, 2, "pixel"))
+        with _quiet():
+            origin, direction, valid = self.local_ray(_components(pixel, 2, "pixel"))
         pose, shift = self.camera_from_world, translation(self.camera_from_world)
         moved = vector(origin[0] - shift[0], origin[1] - shift[1], origin[2] - shift[2])
         return Ray(_last(rotate_back(pose, moved)), _last(rotate_back(pose, direction)), valid)
@@ -92,8 +100,9 @@ class Camera:
         Dr.Jit: an Array3f in, tuples of k entries out. Raises InputError when the last axis is not 3.
         """
         register_pytrees()
-        images = self.local_project(self.local(_components(points, 3, "points")))
-        kind = library(images[0].depth)
+        with _quiet():
+            images = self.local_project(self.local(_components(points, 3, "points")))
+        kind = library(*images[0])
         if kind == "drjit":
             return Projection(*(tuple(image[i] for image in images) for i in range(3)))
         if kind == "jax":
@@ -114,13 +123,21 @@ class Camera:
         corners = _components(triangle, 3, "triangle")
         if corners.ndim < 2 or corners.shape[-1] != 3:
             raise InputError(f"triangle has shape {np.shape(triangle)}: (..., 3, 3) is needed, corners by rows")
-        box = self.local_bound(*(self.local(corners[..., i]) for i in range(3)))
+        with _quiet():
+            box = self.local_bound(*(self.local(corners[..., i]) for i in range(3)))
         return Box(_last(box.low), _last(box.high), box.valid)
 
     def local(self, point: Vector) -> Vector:
-        """World point to the camera frame, components first."""
+        """World point to the camera frame, components first.
+
+        A point that rounding cannot tell from the camera's centre becomes the centre: its direction means nothing.
+        """
         turned, shift = rotate(self.camera_from_world, point), translation(self.camera_from_world)
-        return vector(turned[0] + shift[0], turned[1] + shift[1], turned[2] + shift[2])
+        moved = [turned[i] + shift[i] for i in range(3)]
+        doubt = 4 * epsilon(moved[0])
+        lost = [abs(moved[i]) <= doubt * (abs(turned[i]) + abs(shift[i])) for i in range(3)]
+        centre = lost[0] & lost[1] & lost[2] & isfinite(moved[0] + moved[1] + moved[2])
+        return vector(*(where(centre, 0.0, moved[i]) for i in range(3)))
 
     def contains(self, pixel: Array) -> Array:
         """Whether pixels (..., 2) lie inside the image rectangle."""

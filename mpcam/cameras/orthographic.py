@@ -62,10 +62,11 @@ class Orthographic(Camera):
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
         """Box of the three corners; exact unless the triangle crosses the camera plane."""
+        finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
+        a, b, c = (vector(*(where(finite, corner[i], 0.0) for i in range(3))) for corner in (a, b, c))
         low, high = [], []
         for i, center in enumerate((self.cx, self.cy)):
             low.append(center + self.scale * minimum(minimum(a[i], b[i]), c[i]))
             high.append(center + self.scale * maximum(maximum(a[i], b[i]), c[i]))
-        finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
         valid = finite & ((a[2] >= 0) | (b[2] >= 0) | (c[2] >= 0))
         return Box(vector(*low), vector(*high), valid)

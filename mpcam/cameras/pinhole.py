@@ -101,5 +101,3 @@ class Pinhole(Camera):
                 high[i] = where(crosses & (toward >= -slack), _FAR, high[i])
         valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
         return Box(vector(*low), vector(*high), valid)
-
-

@@ -48,6 +48,11 @@ class Profile:
     limit_included: bool
     convex: bool
 
+    @property
+    def reach(self) -> float:
+        """Largest angle at which to evaluate the profile, radians: the limit, or just below it."""
+        return self.limit if self.limit_included else (1 - 1e-6) * self.limit
+
 
 def _unit(x: Array) -> Array:
     return maximum(minimum(x, 1.0), -1.0)

@@ -19,6 +19,7 @@ from mpcam.math import (
     isfinite,
     library,
     maximum,
+    minimum,
     norm,
     sin,
     sqrt,
@@ -74,7 +75,8 @@ class Radial(Camera):
         ):
             end = "up to" if self.profile.limit_included else "below"
             raise InputError(
-                f"Radial(fov={self.fov:.6g}): the {self.profile.name} profile reaches fields of view {end} {limit:.6g} rad"
+                f"Radial(fov={self.fov:.6g}): the {self.profile.name} profile reaches fields of view "
+                f"{end} {limit:.6g} rad"
             )
 
     @classmethod
@@ -83,7 +85,9 @@ class Radial(Camera):
         return cls(width, height, PARABOLOID, camera_from_world, fov, **rest)
 
     @classmethod
-    def cosine_sphere(cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any) -> Self:
+    def cosine_sphere(
+        cls, width: int, height: int, camera_from_world: Any = None, fov: float = PI, **rest: Any
+    ) -> Self:
         """r = sin(theta): image area is solid angle times cosine; fields of view up to 180 degrees."""
         return cls(width, height, COSINE_SPHERE, camera_from_world, fov, **rest)
 
@@ -171,7 +175,7 @@ class Radial(Camera):
         off_axis = squared > 0
         rho = sqrt(where(off_axis, squared, 1.0))
         theta = atan2(where(off_axis, rho, 0.0), z)
-        reach = where(theta < self.profile.limit, theta, 0.999999 * self.profile.limit)
+        reach = minimum(theta, self.profile.reach)
         ahead = where(z > 0, z, 1.0)
         ratio = where(off_axis, self.profile.radius(reach) / rho, self.profile.slope(0.0 * rho) / ahead)
         ratio = ratio * self.pixels_per_radius

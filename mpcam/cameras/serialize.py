@@ -45,7 +45,7 @@ def camera_from_dict(data: dict[str, Any]) -> Camera:
     schema, name = fields.pop("schema", SCHEMA), fields.pop("model", None)
     if schema != SCHEMA:
         raise InputError(f"camera has schema {schema!r}: this version reads schema {SCHEMA}")
-    if name not in MODELS:
+    if not isinstance(name, str) or name not in MODELS:
         raise InputError(f"camera model {name!r} is unknown: allowed are {', '.join(MODELS)}")
     model = MODELS[name]
     known = {field.name for field in dataclasses.fields(model)}  # pyright: ignore[reportArgumentType]

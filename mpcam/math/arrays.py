@@ -41,48 +41,54 @@ def _functions(*values: Array) -> ModuleType:
     return np
 
 
+def _apply(name: str, *values: Array) -> Array:
+    """A function of the arguments' library; Python numbers give Python numbers, which no library seizes."""
+    result = getattr(_functions(*values), name)(*values)
+    return float(result) if all(type(value) in (float, int) for value in values) else result
+
+
 def sqrt(x: Array) -> Array:
-    return _functions(x).sqrt(x)
+    return _apply("sqrt", x)
 
 
 def sin(x: Array) -> Array:
-    return _functions(x).sin(x)
+    return _apply("sin", x)
 
 
 def cos(x: Array) -> Array:
-    return _functions(x).cos(x)
+    return _apply("cos", x)
 
 
 def tan(x: Array) -> Array:
-    return _functions(x).tan(x)
+    return _apply("tan", x)
 
 
 def asin(x: Array) -> Array:
-    return _functions(x).asin(x)
+    return _apply("asin", x)
 
 
 def acos(x: Array) -> Array:
-    return _functions(x).acos(x)
+    return _apply("acos", x)
 
 
 def atan(x: Array) -> Array:
-    return _functions(x).atan(x)
+    return _apply("atan", x)
 
 
 def atan2(y: Array, x: Array) -> Array:
-    return _functions(y, x).atan2(y, x)
+    return _apply("atan2", y, x)
 
 
 def absolute(x: Array) -> Array:
-    return _functions(x).abs(x)
+    return abs(x)
 
 
 def minimum(x: Array, y: Array) -> Array:
-    return _functions(x, y).minimum(x, y)
+    return _apply("minimum", x, y)
 
 
 def maximum(x: Array, y: Array) -> Array:
-    return _functions(x, y).maximum(x, y)
+    return _apply("maximum", x, y)
 
 
 def isfinite(x: Array) -> Array:

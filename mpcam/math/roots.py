@@ -31,8 +31,10 @@ def invert_increasing(
         usable = usable & (absolute(residual) < 0.5 * residual_before)
         residual_before = absolute(residual)
         x = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
+    first, last = target <= function(zero + low), target >= function(zero + high)
+    x = where(first, zero + low, where(last, zero + high, x))
     x, gradient = detach(x), detach(slope(x))
-    inside = (target > function(zero + low)) & (target < function(zero + high))
+    inside = ~(first | last)
     step = (function(x) - value) / where(gradient > 0, gradient, 1.0)
     return where(inside & (gradient > 0), x - step, x)
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mpcam.math.arrays import Array, library, maximum, sqrt, where
+from mpcam.math.arrays import Array, detach, library, maximum, sqrt, where
 
 Vector = Array  # unpacks into 2 or 3 components of equal shape
 
@@ -36,20 +36,26 @@ def cross(a: Vector, b: Vector) -> Vector:
     return vector(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
+def _scaled(a: Vector) -> tuple[Array, Vector]:
+    """Largest component (a constant to gradients), and the vector divided by it, whose squares cannot overflow."""
+    largest = detach(maximum(maximum(abs(a[0]), abs(a[1])), abs(a[2])))
+    safe = where(largest > 0, largest, 1.0)
+    return largest, vector(a[0] / safe, a[1] / safe, a[2] / safe)
+
+
 def norm(a: Vector) -> Array:
-    """Length of a 3-vector; its gradient at the zero vector is zero."""
-    squared = dot(a, a)
+    """Length of a 3-vector of any magnitude; its gradient at the zero vector is zero."""
+    largest, scaled = _scaled(a)
+    squared = dot(scaled, scaled)
     nonzero = squared > 0
-    return where(nonzero, sqrt(where(nonzero, squared, 1.0)), 0.0)
+    return where(nonzero, largest * sqrt(where(nonzero, squared, 1.0)), 0.0)
 
 
 def normalize(a: Vector) -> Vector:
-    """The 3-vector at length 1; the zero vector stays zero. Scaled first: no overflow from 1e-30 to 1e30 in float32."""
-    largest = maximum(maximum(abs(a[0]), abs(a[1])), abs(a[2]))
-    scale = 1.0 / where(largest > 0, largest, 1.0)
-    scaled = vector(a[0] * scale, a[1] * scale, a[2] * scale)
-    length = norm(scaled)
-    return scaled * (1.0 / where(length > 0, length, 1.0))
+    """The 3-vector at length 1, whatever its magnitude; the zero vector stays zero."""
+    _, scaled = _scaled(a)
+    squared = dot(scaled, scaled)
+    return scaled * (1.0 / sqrt(where(squared > 0, squared, 1.0)))
 
 
 def entry(matrix: Array, row: int, column: int) -> Array:

@@ -1,15 +1,19 @@
 """What the rasterizing methods share: place vertices, run the kernels, decode the depth buffer."""
 
 import functools
+import importlib
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
 from mpcam.rendering.hits import Hits, Stats
+
+MOST_PIXELS = 32767  # along a side: kernels keep two pixel numbers in 32 bits
 
 
 def curved_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
@@ -27,29 +31,40 @@ def image_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
 
 
 @functools.lru_cache(maxsize=64)
-def _pipeline(model: type | None, static: tuple[Any, ...], width: int, height: int, count: bool, backend: str) -> Any:
-    from mpcam_kernels import central, planar
+def _pipeline(
+    test: str, model: type | None, static: tuple[Any, ...], width: int, height: int, count: bool, backend: str
+) -> Any:
+    """The frozen kernels of a test, an image size and, for curved images, a camera model and its static fields."""
     from mpcam_kernels.pipeline import Pipeline
 
-    curved = model is not None
-    return Pipeline(types(), curved_box if curved else image_box, central if curved else planar, width, height, count)
+    return Pipeline(types(), curved_box if model else image_box, kernel_test(test), width, height, count)
+
+
+def kernel_test(name: str) -> Any:
+    """The kernels' module by name: central, planar or projected."""
+    return importlib.import_module(f"mpcam_kernels.{name}")
 
 
 class Buffered:
     """Frames of one camera and mesh by a depth buffer.
 
-    curved: rays through one point are tested against triangles in the camera frame; otherwise pixels against
-    straight-edged triangles in the image plane, which is exact for parallel rays.
+    test: "central" (rays through one point against triangles in the camera frame), "planar" (pixels against
+    straight-edged triangles in the image plane, exact for parallel rays) or "projected" (the same, for corners that
+    were projected one by one).
     """
 
     method: ClassVar[str]
 
-    def __init__(self, camera: Camera, mesh: Mesh, curved: bool):
-        self.camera, self.mesh, self.curved = camera, mesh, curved
+    def __init__(self, camera: Camera, mesh: Mesh, test: str):
+        if max(camera.width, camera.height) > MOST_PIXELS:
+            raise InputError(
+                f"the camera has {camera.width}x{camera.height} pixels: at most {MOST_PIXELS} along a side"
+            )
+        self.camera, self.mesh, self.test, self.curved = camera, mesh, test, test == "central"
         self.device = device_mesh(mesh)
         self.vertices, self.faces = self.device.vertices, self.device.faces
         self.lens: Lens = lens(camera)
-        self.samples = self.lens.directions if curved else self.lens.centres
+        self.samples = self.lens.directions if self.curved else self.lens.centres
         self.pose = self.device.pose(camera)
         self.unit = opaque_numbers([self.device.scale])[0]
 
@@ -81,7 +96,8 @@ class Buffered:
         if self.curved:
             camera, model = self.lens.on_device, type(self.camera)
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
-        kernels = _pipeline(model, static, self.camera.width, self.camera.height, count, backend_name())
+        size = (self.camera.width, self.camera.height)
+        kernels = _pipeline(self.test, model, static, *size, count, backend_name())
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
     def frame(self) -> Hits:
@@ -97,7 +113,7 @@ class Buffered:
         return clock.seconds
 
     def _hits(self, buffer: Any) -> Hits:
-        from mpcam_kernels import central, decode, planar
+        from mpcam_kernels import decode
 
         vertices = self.vertices
         small, depth = _frozen_decode()(buffer, self.unit if self.curved else opaque_one())
@@ -106,7 +122,7 @@ class Buffered:
         def weights() -> tuple[Any, Any]:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
-            test = central if self.curved else planar
+            test = kernel_test(self.test)
             found = decode.weights(types(), test, self.place(vertices), self.faces, small, self.samples.pixels)
             return self.parent_weights(small, *found)
 
@@ -127,7 +143,6 @@ def opaque_one() -> Any:
 
 @functools.cache
 def _frozen_decode() -> Any:
-    import drjit as dr
 
     from mpcam_kernels import decode
     from mpcam_kernels.frozen import frozen

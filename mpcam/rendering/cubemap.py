@@ -41,7 +41,8 @@ def face_cameras(camera: Camera, resolution: int, half: bool) -> list[Pinhole]:
             size[side] = (resolution + 1) // 2
             centre[side] = 0.5 * resolution if number in (1, 3) else size[side] - 0.5 * resolution
         focal = 0.5 * resolution
-        cameras.append(Pinhole(size[0], size[1], focal, focal, *centre, pose @ np.asarray(camera.camera_from_world)))
+        pose = pose @ np.asarray(camera.camera_from_world)
+        cameras.append(Pinhole(size[0], size[1], focal, focal, centre[0], centre[1], pose))
     return cameras
 
 
@@ -52,7 +53,11 @@ class Cubemapped:
     half = False
 
     def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
-        if isinstance(resolution, bool) or not isinstance(resolution, (int, np.integer)) or not 1 <= resolution <= 16384:
+        if (
+            isinstance(resolution, bool)
+            or not isinstance(resolution, (int, np.integer))
+            or not 1 <= resolution <= 16384
+        ):
             raise InputError(f"resolution={resolution!r}: a whole number of pixels from 1 to 16384 is needed")
         angle = camera.domain.max_angle
         if not camera.central or angle is None:

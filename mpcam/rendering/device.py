@@ -12,6 +12,7 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.profiles import Profile
 from mpcam.errors import InputError, SetupError
 from mpcam.geometry.mesh import Mesh
+from mpcam.math import library
 
 
 def types() -> Any:
@@ -44,7 +45,11 @@ class DeviceMesh:
         """Other positions of the same vertices, uploaded."""
         with np.errstate(invalid="ignore", over="ignore"):
             flat = ((vertices - self.anchor) / self.scale).astype(np.float32).ravel()
-        return types().Float(flat) + opaque_zero()  # in Dr.Jit's own memory: frozen kernels are particular about alignment
+        if flat.size == 0:
+            return types().Float()
+        return (
+            types().Float(flat) + opaque_zero()
+        )  # in Dr.Jit's own memory: frozen kernels are particular about alignment
 
     def pose(self, camera: Camera) -> list[Any]:
         """Rotation (9) and shift (3) from device vertices to the camera frame in units of `scale`, opaque."""
@@ -77,7 +82,9 @@ _meshes: weakref.WeakKeyDictionary[Mesh, DeviceMesh] = weakref.WeakKeyDictionary
 def device_mesh(mesh: Mesh) -> DeviceMesh:
     """The mesh on the device; uploaded at the first call."""
     if not isinstance(mesh, Mesh):
-        raise InputError(f"a mpcam.Mesh is needed, got {type(mesh).__name__}: see mpcam.load_mesh and mpcam.builtin_mesh")
+        raise InputError(
+            f"a mpcam.Mesh is needed, got {type(mesh).__name__}: see mpcam.load_mesh and mpcam.builtin_mesh"
+        )
     found = _meshes.get(mesh)
     if found is None:
         found = DeviceMesh(mesh)
@@ -102,26 +109,37 @@ def device_lens(camera: Camera) -> Camera:
     return lens
 
 
+def _check_profile(profile: Any) -> None:
+    """See that a user's profile runs on Dr.Jit arrays: inside a kernel's recording it is too late to say so."""
+    if not isinstance(profile, Profile):
+        return
+    theta, problem = types().Float([0.1, 0.2]), ""
+    for name in ("radius", "slope", "angle"):
+        try:
+            result = getattr(profile, name)(theta)
+        except (TypeError, ValueError, AttributeError, RuntimeError) as error:
+            problem = f"{name} fails: {error}"
+        else:
+            problem = problem or ("" if library(result) == "drjit" else f"{name} gives a {type(result).__name__}")
+        if problem:
+            text = " ".join(problem.split())
+            raise InputError(
+                f"profile {profile.name!r} does not run on Dr.Jit arrays ({text}): use mpcam.math functions"
+            )
+
+
 class Lens:
     """Rays and kernels' view of a camera, which hold for every pose of it."""
 
     def __init__(self, camera: Camera):
+        import drjit as dr
+
         from mpcam_kernels import samples
 
+        _check_profile(getattr(camera, "profile", None))
         self.on_device = device_lens(camera)
-        t = types()
-        try:
-            self.ray = self.on_device.local_ray(samples.pixel_centres(t, camera.width, camera.height))
-            import drjit as dr
-
-            dr.eval(self.ray)
-        except TypeError as error:
-            profile = getattr(camera, "profile", None)
-            if isinstance(profile, Profile):
-                raise InputError(
-                    f"profile {profile.name!r} does not run on Dr.Jit arrays ({error}): write it with mpcam.math functions"
-                ) from None
-            raise
+        self.ray = self.on_device.local_ray(samples.pixel_centres(types(), camera.width, camera.height))
+        dr.eval(self.ray)
 
     @functools.cached_property
     def directions(self) -> Any:

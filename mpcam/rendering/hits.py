@@ -92,4 +92,5 @@ class Hits:
         return np.asarray(values.numpy()).reshape(self.camera.height, self.camera.width)
 
     def __repr__(self) -> str:
-        return f"Hits({self.camera.width}x{self.camera.height}, method={self.method!r}, {self.mesh.triangle_count} triangles)"
+        size = f"{self.camera.width}x{self.camera.height}"
+        return f"Hits({size}, method={self.method!r}, {self.mesh.triangle_count} triangles)"

@@ -23,7 +23,7 @@ class Inverted(Buffered):
     def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight"):
         if bound not in BOUNDS:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
-        super().__init__(camera, mesh, curved=camera.central)
+        super().__init__(camera, mesh, "central" if camera.central else "planar")
 
     def place(self, vertices: Any) -> Any:
         import drjit as dr
@@ -37,7 +37,6 @@ class Inverted(Buffered):
 @functools.cache
 def _frozen_place(curved: bool) -> Any:
     """Kernel that brings vertices to the camera frame, or into the image plane for parallel rays."""
-    import drjit as dr
 
     from mpcam_kernels.frozen import frozen
 

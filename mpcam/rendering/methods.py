@@ -38,7 +38,9 @@ def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settin
     the camera.
     """
     if not isinstance(camera, Camera):
-        raise InputError(f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid")
+        raise InputError(
+            f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid"
+        )
     if isinstance(mesh, Scene):
         mesh = mesh.mesh
     kinds = {"invert": ("bound",), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}

@@ -162,7 +162,9 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
         mix = (1 - weights[0] - weights[1], weights[0], weights[1])
 
         def mixed(kind: Any, values: Any) -> Any:
-            return sum(dr.gather(kind, values, corner, hit) * weight for corner, weight in zip(corners, mix, strict=True))
+            return sum(
+                dr.gather(kind, values, corner, hit) * weight for corner, weight in zip(corners, mix, strict=True)
+            )
 
         colour, normal = t.Array3f(1.0), None
         if shading != "normal":

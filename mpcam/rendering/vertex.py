@@ -18,19 +18,24 @@ MOST_TRIANGLES = 1 << 26
 class VertexProjected(Buffered):
     """Frames by projected vertices; each edge of the mesh is split 2**level times first.
 
-    Depth and barycentric weights are linear in the image, as a game's vertex shader would have them. Small triangles
-    with a corner that has no image at all are left out; a corner beyond the rim is projected as far as f goes on.
+    Depth and barycentric weights are linear in the image, as a game's vertex shader would have them. A corner beyond
+    the rim is projected as far as f goes on; small triangles wholly out of view, or with a corner that has no image at
+    all, are left out.
     """
 
     method = "vertex"
 
     def __init__(self, camera: Camera, mesh: Mesh, level: int = 0):
         if isinstance(level, bool) or not isinstance(level, (int, np.integer)) or not 0 <= level <= MOST_LEVELS:
-            raise InputError(f"level={level!r}: a whole number from 0 to {MOST_LEVELS} is needed (edges split 2**level times)")
+            raise InputError(
+                f"level={level!r}: a whole number from 0 to {MOST_LEVELS} is needed (edges split 2**level times)"
+            )
         total = mesh.triangle_count * 4**level
         if total > MOST_TRIANGLES:
-            raise InputError(f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}")
-        super().__init__(camera, mesh, curved=False)
+            raise InputError(
+                f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}"
+            )
+        super().__init__(camera, mesh, "projected" if camera.central else "planar")
         self.level = int(level)
         self.parts = Parts(2**self.level)
         self.corners = self.faces  # of the whole triangles
@@ -60,7 +65,7 @@ class VertexProjected(Buffered):
 
 @functools.cache
 def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
-    """Kernel that makes the tessellation's vertices and projects them to (pixel, depth); NaN where there is no image."""
+    """Kernel that makes the tessellation's vertices and projects them to (pixel, depth); NaN: there is no image."""
     import drjit as dr
 
     from mpcam_kernels.frozen import frozen
@@ -82,8 +87,8 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
         point = point * unit if not central else point
         pixel, inside = camera.local_image(point)
         depth = dr.norm(point) * unit if central else point.z
-        # Behind a pinhole there is no image; beyond the rim of a disc there is one, as far as f goes on.
-        depth = dr.select(inside, depth, dr.nan) if unbounded and central else depth
+        # Behind a pinhole there is no image; beyond the rim of a disc there is one, marked by a negative depth.
+        depth = dr.select(inside, depth, dr.nan if unbounded else -depth) if central else depth
         return flat(target, types().Array3f(pixel.x, pixel.y, depth), number)
 
     return place

@@ -7,7 +7,7 @@ import numpy as np
 from mpcam.cameras.base import Camera
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh, lens, types
+from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.truth.meshes import mitsuba_mesh, move, position_key
 from mpcam.truth.variant import mitsuba
@@ -43,7 +43,8 @@ class RayTraced:
             self._ray = mi.Ray3f(mi.Point3f(*world), mi.Vector3f(*along))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
-            self._scene = self._parameters = None
+            self._scene: Any = None
+            self._parameters: Any = None
             if not self._empty:
                 positions = dr.select(dr.isfinite(self.device.vertices), self.device.vertices, 0.0)
                 shape = mitsuba_mesh(mi, "mesh", positions, faces)
@@ -82,23 +83,17 @@ class RayTraced:
                 second, third = (dr.select(t.Bool(hit), t.Float(dr.detach(w)), 0.0) for w in found.prim_uv)
             dr.eval(triangle, depth, second, third)
             del mi
-        return Hits(
-            self.camera, self.mesh, self.method, triangle, depth, lambda: (second, third), lambda: Stats(0, 0)
-        )
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, lambda: (second, third), lambda: Stats(0, 0))
 
     def stages(self) -> dict[str, float]:
-        """Seconds of building the tree and of tracing, each with the device at rest before and after.
-
-        The tree is built by the first ray that needs it, so building is what a frame after a change takes longer.
-        """
+        """Seconds of rebuilding the tree over the present positions, and of tracing."""
         if self._scene is None:
             return {"build": 0.0, "trace": 0.0}
         clock = Clock()
-        with mitsuba():
-            move(self._parameters, self._key, self._parameters[self._key] + 0.0)
-        self.frame()
+        with mitsuba() as mi:
+            # Written anew, or Mitsuba would see that nothing changed.
+            move(self._parameters, self._key, self._parameters[self._key] + mi.Float(opaque_zero()))
         clock.done("build")
         self.frame()
         clock.done("trace")
-        clock.seconds["build"] = max(0.0, clock.seconds["build"] - clock.seconds["trace"])
         return clock.seconds

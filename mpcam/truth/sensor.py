@@ -20,7 +20,9 @@ _registered: set[str] = set()
 _kept: dict[str, Camera] = {}
 
 
-def sensor(camera: Camera, samples: int = 16, *, centred: bool = False, film: dict[str, Any] | None = None) -> dict[str, Any]:
+def sensor(
+    camera: Camera, samples: int = 16, *, centred: bool = False, film: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """A Mitsuba dictionary for a camera: the sensor with its film and sampler, to be put into a scene dictionary.
 
     samples: per pixel. centred: every sample goes through its pixel's centre, as the rasterizer's do. film: other
@@ -78,7 +80,9 @@ def _read(text: str) -> Camera:
     try:
         return camera_from_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"sensor mpcam: camera={text!r} is neither JSON nor a file that can be read ({error})") from None
+        raise InputError(
+            f"sensor mpcam: camera={text!r} is neither JSON nor a file that can be read ({error})"
+        ) from None
 
 
 def _sensor_class(mi: Any) -> type:
@@ -111,7 +115,9 @@ def _sensor_class(mi: Any) -> type:
             origin, direction, valid = self.camera.ray(mi.Array2f(pixel) if hasattr(mi, "Array2f") else pixel)
             return mi.Point3f(origin), mi.Vector3f(direction), valid
 
-        def sample_ray(self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True) -> tuple[Any, Any]:
+        def sample_ray(
+            self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True
+        ) -> tuple[Any, Any]:
             wavelengths, weight = self.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), sample1, active)
             origin, direction, valid = self._ray(self._pixel(sample2))
             ray = mi.Ray3f(origin, direction, time, wavelengths)

@@ -1,0 +1,246 @@
+"""The command line: parse, call, print. Everything that it does can be done from Python too."""
+
+import csv
+import json
+import os
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+import mpcam
+from mpcam.errors import InputError, SetupError
+from mpcam_kernels.backend import BackendError
+
+if TYPE_CHECKING:
+    from mpcam.io.scenes import SceneFile
+
+EXIT_FAILURE, EXIT_INPUT, EXIT_INTERRUPT = 1, 2, 130
+
+app = App(
+    name="mpcam",
+    help="Cameras that are not pinholes: render through them, and compare what each method costs and gains.",
+    version=mpcam.__version__,
+    suppress_keyboard_interrupt=False,  # main answers it
+    help_format="plaintext",
+    default_parameter=Parameter(negative=(), show_default=False),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line (default: that of this process); returns the exit status.
+
+    0: done. 1: this machine lacks something, see `mpcam doctor`. 2: a mistake in what was given. 130: interrupted.
+    """
+    try:
+        status = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except (InputError, CycloptsError) as error:
+        return _complain(error, EXIT_INPUT)
+    except (SetupError, BackendError) as error:
+        return _complain(error, EXIT_FAILURE)
+    except KeyboardInterrupt:
+        return _complain("interrupted", EXIT_INTERRUPT)
+    except BrokenPipeError:  # the reader of our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILURE
+    return status or 0
+
+
+@app.command
+def compare(
+    scene: str | None = None,
+    /,
+    *,
+    demo: bool = False,
+    output: Path | None = None,
+    methods: str | None = None,
+    repeats: int | None = None,
+    size: str | None = None,
+    json: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Render a scene by every method that applies; error against run time as a table, a plot and a page.
+
+    Args:
+        scene: TOML file, mesh file or name of a built-in scene.
+        demo: Compare the built-in scenes of the demo instead.
+        output: Folder for the page, the plot, the numbers and the images; out/SCENE if not given.
+        methods: Names with commas between; all that apply if not given.
+        repeats: Timed rounds.
+        size: Image size in pixels, as 640x480 or 512.
+        json: Print the numbers as JSON.
+        quiet: Print nothing but mistakes.
+    """
+    from rich.console import Console
+
+    from mpcam.comparison.demo import SIZE, run_demo
+    from mpcam.comparison.driver import compare as run
+    from mpcam.comparison.progress import bar
+    from mpcam.comparison.terminal import WIDTH, print_comparison
+
+    if demo == (scene is not None):
+        raise InputError("compare needs one thing to compare: give a scene or --demo")
+    if demo and methods:
+        raise InputError("--methods does not go with --demo, which compares all: give a scene")
+    console = Console(quiet=quiet or json, width=None if sys.stdout.isatty() else WIDTH)
+    _check_machine()
+    if demo:
+        width, height = _size(size) if size else (SIZE, SIZE)
+        if width != height:
+            raise InputError(f"--size {size}: the demo is square, give one number")
+        rounds: dict[str, Any] = {} if repeats is None else {"repeats": repeats}
+        results = run_demo(output or Path("out/demo"), size=width, console=console, **rounds)
+        if json:
+            _print_json([result.to_dict() for result in results])
+        return
+    loaded = _load(str(scene), size)
+    asked = loaded.compare
+    names = asked.methods if methods is None else tuple(name.strip() for name in methods.split(","))
+    options: dict[str, Any] = {"shading": asked.shading, "repeats": asked.repeats if repeats is None else repeats}
+    settings = {method: entries for method, entries in asked.settings.items() if names is None or method in names}
+    folder = output or Path("out") / (re.sub(r"[^\w.-]+", "-", loaded.scene.name).strip(".") or "scene")
+    with bar(Console(stderr=True, quiet=quiet), loaded.scene.name) as progress:
+        result = run(
+            loaded.scene,
+            names,
+            settings=settings,
+            output=folder,
+            progress=progress,
+            **{name: value for name, value in options.items() if value is not None},
+        )
+    if json:
+        _print_json(result.to_dict())
+        return
+    print_comparison(result, console)
+    console.print(f"Report: {folder / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command
+def render(
+    scene: str,
+    /,
+    *,
+    output: Path,
+    method: str = "invert",
+    size: str | None = None,
+    projection: str | None = None,
+    shading: str = "light",
+    level: int | None = None,
+    resolution: int | None = None,
+) -> None:
+    """Render a scene or mesh to an image file; an EXR also keeps the depth and the camera.
+
+    Args:
+        scene: TOML file, mesh file or name of a built-in scene.
+        output: Image file: .png, .exr and others.
+        method: invert, vertex, cubemap, hemicube or raytrace.
+        size: Image size in pixels, as 640x480 or 512.
+        projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
+        shading: light, color, normal or texture.
+        level: Times that --method vertex halves each edge.
+        resolution: Pixels along a face of --method cubemap and hemicube.
+    """
+    from rich.console import Console
+
+    from mpcam.cameras.change import projected
+    from mpcam.io.image_formats import format_of
+    from mpcam.io.images import write_image
+    from mpcam.rendering.methods import rasterize
+    from mpcam.rendering.shade import shade
+
+    layers = format_of(output).layers
+    _check_machine()
+    loaded = _load(scene, size).scene
+    camera = projected(loaded.camera, projection) if projection else loaded.camera
+    settings = {name: n for name, n in (("level", level), ("resolution", resolution)) if n is not None}
+    with Console(stderr=True).status(f"rendering {loaded.name}"):
+        hits = rasterize(camera, loaded.mesh, method=method, **settings)
+        image = shade(hits, loaded, shading)
+        write_image(output, image, **({"depth": hits.depth, "camera": camera} if layers else {}))
+
+
+@app.command
+def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=True)], /, *, json: bool = False) -> None:
+    """Project points into the image: a row each with the number of the point, pixel (u right, v down), depth, valid.
+
+    Args:
+        scene: Camera as a JSON file or in the header of an EXR image, or a scene whose camera is taken.
+        points: Text file with rows of x, y, z in world coordinates; - for standard input.
+        json: Print JSON: for each point the list of its images, null where it has none.
+    """
+    from mpcam.io.cameras import load_camera
+    from mpcam.io.points import read_points
+
+    found = load_camera(scene).project(read_points(points))
+    rows = [
+        [(*map(float, pixel), float(depth)) if valid else None for pixel, depth, valid in zip(*images, strict=True)]
+        for images in zip(found.pixel, found.depth, found.valid, strict=True)
+    ]
+    if json:
+        keys = ("u", "v", "depth")
+        _print_json([[None if image is None else dict(zip(keys, image, strict=True)) for image in row] for row in rows])
+        return
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(["point", "u", "v", "depth", "valid"])
+    for number, row in enumerate(rows):
+        for image in row:
+            writer.writerow([number, *(image or ("", "", "")), int(image is not None)])
+
+
+@app.command
+def doctor(*, json: bool = False) -> int:
+    """Say whether this machine is fit to run mpcam, and what to install if it is not.
+
+    Args:
+        json: Print the answers as JSON.
+    """
+    from rich.console import Console
+
+    from mpcam.doctor import examine, is_fit, report, table
+
+    with Console(stderr=True).status("asking each part in a process of its own"):
+        checks = examine()
+    if json:
+        _print_json(report(checks))
+    else:
+        Console(width=None if sys.stdout.isatty() else 100).print(table(checks))
+    return 0 if is_fit(checks) else EXIT_FAILURE
+
+
+def _load(name: str, size: str | None) -> "SceneFile":
+    from mpcam.cameras.change import resized
+    from mpcam.io.scenes import load_scene
+
+    loaded = load_scene(name)
+    if size is None:
+        return loaded
+    return replace(loaded, scene=replace(loaded.scene, camera=resized(loaded.scene.camera, *_size(size))))
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6})(?:x(\d{1,6}))?", text.strip().lower())
+    if not found or 0 in (size := (int(found[1]), int(found[2] or found[1]))):
+        raise InputError(f"--size {text}: give the width and height in pixels, as 640x480 or 512")
+    return size
+
+
+def _check_machine() -> None:
+    from mpcam.doctor import check_llvm
+    from mpcam_kernels.backend import backend_name
+
+    if backend_name() == "llvm":
+        check_llvm()
+
+
+def _print_json(data: Any) -> None:
+    print(json.dumps(data, indent=2, allow_nan=False))
+
+
+def _complain(error: object, status: int) -> int:
+    print("mpcam:", " ".join(str(error).split()), file=sys.stderr)
+    return status

@@ -1,0 +1,1 @@
+"""Triangle meshes, scenes, and where they come from."""

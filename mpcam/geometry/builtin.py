@@ -1,0 +1,95 @@
+"""The built-in meshes and scenes: the four of Gascuel et al. 2008, section 5.1, made procedurally, and plain shapes."""
+
+from importlib import import_module
+from typing import NamedTuple
+
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.scene import DirectionalLight, Scene
+
+
+class _Recipe(NamedTuple):
+    """Where a mesh is made, how many triangles it may have, and the view that shows it."""
+
+    module: str
+    default: int
+    fewest: int
+    most: int
+    eye: tuple[float, float, float] = (0.0, 0.0, 1.6)
+    target: tuple[float, float, float] = (1.0, 0.0, 1.6)
+    sun: tuple[float, float, float] = (0.4, 0.5, -0.8)
+    brightness: float = 1.0
+
+
+_RECIPES = {
+    "facade": _Recipe("facade", 2_800, 600, 4_900, target=(1.0, 0.0, 1.95), sun=(0.25, 0.42, -0.87)),
+    "temple": _Recipe("temple", 4_000, 2_200, 100_000, target=(1.0, 0.0, 2.1)),
+    "characters": _Recipe("characters", 177_000, 25_000, 2_000_000, target=(0.0, 1.0, 1.25), sun=(-0.4, 0.5, -0.75)),
+    "patio": _Recipe("patio", 560_000, 60_000, 3_000_000, target=(1.0, 0.25, 1.9)),
+    "sphere": _Recipe("plain", 1_280, 20, 1_310_720, eye=(0.0, -1.6, 0.0), target=(0.0, 0.0, 0.0)),
+    "plane": _Recipe("plain", 2, 2, 2_000_000, eye=(0.0, -0.5, 1.0), target=(0.0, 0.0, 0.0)),
+    "cube": _Recipe("plain", 12, 12, 1_200_000, eye=(-1.6, -2.2, 1.6), target=(0.0, 0.0, 0.0)),
+    "quad_room": _Recipe("plain", 12, 12, 1_200_000),
+}
+
+
+class BuiltinMesh:
+    """Callable: `builtin_mesh(name, triangles=None) -> Mesh`; `builtin_mesh.names` lists the names."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(_RECIPES)
+
+    def __call__(self, name: str, triangles: int | None = None) -> Mesh:
+        """A mesh made by formula, the same every time. z is up, metres, around the origin.
+
+        name: "facade" (a street, default 2,800 triangles of 600 to 4,900), "temple" (columns of long thin triangles,
+        4,000 of 2,200 to 100,000), "characters" (people on a plain ground, 177,000 of 25,000 to 2,000,000), "patio"
+        (a furnished courtyard, 560,000 of 60,000 to 3,000,000): stand-ins for the scenes of Gascuel et al. 2008,
+        section 5.1, meant to be seen from (0, 0, 1.6). Or "sphere", "plane", "cube", "quad_room" (seen from inside).
+        triangles: the level of detail that comes nearest is made, in the first four within 3 %; the plain shapes only
+        come in 20 * 4**k (sphere), 2 n**2 (plane) and 12 n**2. Raises InputError for other names and numbers.
+        """
+        recipe = _recipe(name)
+        if triangles is None:
+            triangles = recipe.default
+        if isinstance(triangles, bool) or not hasattr(triangles, "__index__"):
+            raise InputError(
+                f"triangles={shown(triangles)}: give a whole number, or leave it out for {recipe.default:,}"
+            )
+        triangles = int(triangles)
+        if not recipe.fewest <= triangles <= recipe.most:
+            raise InputError(f"{name} has {recipe.fewest:,} to {recipe.most:,} triangles, not {triangles:,}")
+        module = import_module(f"mpcam.geometry.{recipe.module}")
+        return getattr(module, name)(triangles)
+
+    def __repr__(self) -> str:
+        return "builtin_mesh(name, triangles=None)"
+
+
+builtin_mesh = BuiltinMesh()
+
+
+def builtin_scene(name: str, width: int = 512, height: int = 512, triangles: int | None = None) -> Scene:
+    """The mesh of that name with a paraboloid camera (180 degrees) in a good place, a sun, and a blue sky behind.
+
+    width, height: pixels. triangles: see builtin_mesh. Raises InputError as builtin_mesh does.
+    """
+    from mpcam.cameras import Radial, look_at
+
+    recipe = _recipe(name)
+    return Scene(
+        (builtin_mesh(name, triangles),),
+        camera=Radial.paraboloid(width, height, camera_from_world=look_at(recipe.eye, recipe.target)),
+        lights=(DirectionalLight(recipe.sun, (1.0, 0.96, 0.88)),),
+        ambient=(0.34, 0.37, 0.42),
+        background=(0.33, 0.55, 0.86),
+        name=name,
+    )
+
+
+def _recipe(name: str) -> _Recipe:
+    recipe = _RECIPES.get(name) if isinstance(name, str) else None
+    if recipe is None:
+        raise InputError(f"there is no built-in mesh {shown(name)}: choose from {', '.join(_RECIPES)}")
+    return recipe

@@ -1,0 +1,107 @@
+"""A scene: meshes, lights, and the camera that looks at them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh, shown
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel light. direction: the way that the light travels, in world axes, stored with length 1.
+
+    radiance: linear RGB that a white diffuse surface facing the light shows. Raises InputError for a zero direction or
+    negative radiance.
+    """
+
+    direction: Vector
+    radiance: Vector = (1.0, 1.0, 1.0)
+
+    def __post_init__(self):
+        direction = np.array(_vector(self.direction, "light direction"))
+        largest = np.abs(direction).max()
+        if largest == 0:
+            raise InputError("light direction is (0, 0, 0): give the way the light travels, e.g. (0, 0, -1) for down")
+        direction /= largest
+        x, y, z = direction / np.sqrt(direction @ direction)
+        object.__setattr__(self, "direction", (float(x), float(y), float(z)))
+        object.__setattr__(self, "radiance", _vector(self.radiance, "light radiance", positive=True))
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """Light from a point. position: world. intensity: linear RGB at distance 1; it falls with the distance squared.
+
+    Raises InputError for anything that is not 3 finite numbers, and for negative intensity.
+    """
+
+    position: Vector
+    intensity: Vector = (1.0, 1.0, 1.0)
+
+    def __post_init__(self):
+        object.__setattr__(self, "position", _vector(self.position, "light position"))
+        object.__setattr__(self, "intensity", _vector(self.intensity, "light intensity", positive=True))
+
+
+Light = DirectionalLight | PointLight
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is rendered: meshes in world coordinates, lights, and a camera.
+
+    meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
+    linear RGB. Raises InputError where a field has the wrong kind.
+    """
+
+    meshes: tuple[Mesh, ...]
+    camera: Any = None
+    lights: tuple[Light, ...] = ()
+    ambient: Vector = (0.15, 0.15, 0.15)
+    background: Vector = (0.0, 0.0, 0.0)
+    name: str = "scene"
+
+    def __post_init__(self):
+        object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
+        object.__setattr__(self, "lights", _several(self.lights, Light, "lights", "DirectionalLight or PointLight"))
+        object.__setattr__(self, "ambient", _vector(self.ambient, "ambient", positive=True))
+        object.__setattr__(self, "background", _vector(self.background, "background", positive=True))
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """All meshes as one, faces in order; built once."""
+        return Mesh.concatenate(self.meshes, name=self.name)
+
+    @staticmethod
+    def of(x) -> "Scene":
+        """x itself if it is a Scene; a Mesh or a sequence of Mesh as a scene without lights; else InputError."""
+        if isinstance(x, Scene):
+            return x
+        if isinstance(x, Mesh):
+            return Scene((x,), name=x.name or "scene")
+        if isinstance(x, (list, tuple)):
+            return Scene(tuple(x))
+        raise InputError(f"a {type(x).__name__} is not a scene: give a Scene, a Mesh or a list of Mesh (see load_mesh)")
+
+
+def _several(value, kind, name: str, allowed: str) -> tuple:
+    items = (value,) if isinstance(value, kind) else value
+    if not isinstance(items, (list, tuple)) or not all(isinstance(item, kind) for item in items):
+        raise InputError(f"scene {name} is a {type(value).__name__}: give a tuple of {allowed}")
+    return tuple(items)
+
+
+def _vector(value, name: str, positive: bool = False) -> Vector:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape != (3,) or not np.all(np.isfinite(array)) or (positive and np.any(array < 0)):
+        raise InputError(f"{name} is {shown(value)}: give 3 finite numbers{', none negative' if positive else ''}")
+    return (float(array[0]), float(array[1]), float(array[2]))

@@ -1,0 +1,134 @@
+"""The tables of a scene file turned into meshes, lights and a camera."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mpcam.geometry.mesh import Material, Mesh
+from mpcam.geometry.scene import DirectionalLight, Light, PointLight, Scene
+from mpcam.io.images import read_image
+from mpcam.io.scene_camera import build_camera, default_camera
+from mpcam.io.scene_tables import DirectionalTable, MeshTable, PointTable, SceneTable
+from mpcam.io.scene_text import SceneText
+
+
+def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> Scene:
+    """The scene that the tables describe; file names are relative to folder, name is used where the file gives none.
+
+    Raises InputError, with the line of the key, for what the tables' types do not rule out.
+    """
+    meshes = tuple(_mesh(entry, index, folder, text) for index, entry in enumerate(table.mesh))
+    bounds = bounds_of(meshes)
+    if table.camera is None:
+        with text.at("mesh"):
+            camera = default_camera(bounds)
+    else:
+        camera = build_camera(table.camera, bounds, text)
+    if table.light is None:
+        lights: tuple[Light, ...] = (default_light(camera),)
+    else:
+        lights = tuple(_light(entry, index, text) for index, entry in enumerate(table.light))
+    return Scene(
+        meshes,
+        camera=camera,
+        lights=lights,
+        ambient=_color(table.ambient, text, "ambient"),
+        background=_color(table.background, text, "background"),
+        name=table.name or name,
+    )
+
+
+def bounds_of(meshes: tuple[Mesh, ...]) -> np.ndarray:
+    """(2, 3) smallest and largest coordinates of all meshes that have vertices; zeros if there are none."""
+    boxes = [mesh.bounds for mesh in meshes if len(mesh.vertices)]
+    if not boxes:
+        return np.zeros((2, 3))
+    return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
+def default_light(camera: Any) -> DirectionalLight:
+    """White light from behind the camera, to its left and above, so that what it sees is lit but not flatly."""
+    right, down, forward = np.asarray(camera.camera_from_world)[:3, :3]
+    x, y, z = forward + 0.5 * right + 0.6 * down
+    return DirectionalLight((float(x), float(y), float(z)))
+
+
+def _mesh(table: MeshTable, index: int, folder: Path, text: SceneText) -> Mesh:
+    where = ("mesh", index)
+    if (table.file is None) == (table.builtin is None):
+        raise text.error(where, "give either file (a mesh file) or builtin (the name of a built-in mesh)")
+    if table.file is not None:
+        if table.triangles is not None:
+            raise text.error((*where, "triangles"), "only built-in meshes can be made with a number of triangles")
+        from mpcam.geometry.load import load_mesh
+
+        with text.at(*where, "file"):
+            mesh = load_mesh(folder / table.file)
+    else:
+        mesh = _builtin(table, where, text)
+    with text.at(*where):
+        mesh = mesh.transformed(_placement(table, where, text))
+    if table.color is None and table.texture is None:
+        return mesh
+    texture = None if table.texture is None else _texture(folder / table.texture, mesh, text, (*where, "texture"))
+    color = (1.0, 1.0, 1.0) if table.color is None else _color(table.color, text, *where, "color")
+    return replace(mesh, materials=(Material(color, texture),), face_material=None)
+
+
+def _builtin(table: MeshTable, where: tuple[str, int], text: SceneText) -> Mesh:
+    from mpcam.geometry.builtin import builtin_mesh
+
+    if table.builtin not in builtin_mesh.names:
+        raise text.error((*where, "builtin"), f"allowed are {', '.join(builtin_mesh.names)}")
+    with text.at(*where, "triangles" if table.triangles else "builtin"):
+        return builtin_mesh(table.builtin, triangles=table.triangles)
+
+
+def _placement(table: MeshTable, where: tuple[str, int], text: SceneText) -> np.ndarray:
+    """4x4: scale, then rotate, then translate."""
+    scale = np.broadcast_to(np.asarray(table.scale, float), 3)
+    if not np.all(scale >= 1e-30):
+        raise text.error((*where, "scale"), "give numbers above 0 (from 1e-30)")
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.diag(scale)
+    if table.rotate is not None:
+        axis = np.array(table.rotate.axis)
+        largest = np.abs(axis).max()
+        if largest == 0:
+            raise text.error((*where, "rotate", "axis"), "give a direction, e.g. [0, 0, 1]")
+        axis = axis / largest
+        matrix[:3, :3] = _rotation(axis / np.linalg.norm(axis), math.radians(table.rotate.degrees)) @ matrix[:3, :3]
+    matrix[:3, 3] = table.translate
+    return matrix
+
+
+def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """3x3 right-handed rotation about a unit axis (Rodrigues' formula)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross)
+
+
+def _texture(path: Path, mesh: Mesh, text: SceneText, where: tuple[str | int, ...]) -> np.ndarray:
+    if mesh.uv is None:
+        raise text.error(where, "the mesh has no texture coordinates: leave texture out, or give a mesh with uv")
+    with text.at(*where):
+        image = read_image(path)
+    return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
+
+
+def _light(table: DirectionalTable | PointTable, index: int, text: SceneText) -> Light:
+    with text.at("light", index):
+        if isinstance(table, DirectionalTable):
+            return DirectionalLight(table.direction, _color(table.radiance, text, "light", index, "radiance"))
+        return PointLight(table.position, _color(table.intensity, text, "light", index, "intensity"))
+
+
+def _color(value: Any, text: SceneText, *where: str | int) -> tuple[float, float, float]:
+    red, green, blue = np.broadcast_to(np.asarray(value, float), 3)
+    if min(red, green, blue) < 0:
+        raise text.error(where, "give linear RGB numbers that are not negative")
+    return (float(red), float(green), float(blue))

@@ -1,0 +1,119 @@
+"""The tables of a scene file, as typed records; docs of each key are here, checks that need numbers in scene_build.
+
+Angles are in degrees, lengths in scene units, colours linear RGB (one number stands for a grey).
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+Vector = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+Positive = Annotated[float, Meta(gt=0)]
+# no limits on these: msgspec 0.22 crashes in garbage collection on a limited number that may also be a tuple
+Scale = float | Vector
+Color = float | Vector
+Pixels = Annotated[int, Meta(ge=1, le=32768)]
+
+
+class Table(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """A table in which every key must be known."""
+
+
+class RotateTable(Table, frozen=True):
+    """Right-handed rotation about an axis through the origin."""
+
+    axis: Vector
+    degrees: float
+
+
+class MeshTable(Table, frozen=True):
+    """[[mesh]]: a mesh file (path relative to the scene file) or a built-in mesh; scaled, then rotated, then moved."""
+
+    file: str | None = None
+    builtin: str | None = None
+    triangles: Annotated[int, Meta(ge=1)] | None = None  # built-in meshes only
+    scale: Scale = 1.0
+    rotate: RotateTable | None = None
+    translate: Vector = (0.0, 0.0, 0.0)
+    color: Color | None = None  # replaces the materials of the mesh
+    texture: str | None = None  # an image file; replaces the materials too, and is multiplied by color
+
+
+class CameraTable(Table, tag_field="model", frozen=True):
+    """[camera]: keys of every model. Without a pose, the camera is put where it sees all meshes."""
+
+    size: tuple[Pixels, Pixels] = (512, 512)  # width, height
+    eye: Vector | None = None
+    target: Vector | None = None
+    up: Vector | None = None  # default: +z
+    camera_from_world: tuple[Row, Row, Row, Row] | None = None  # instead of eye and target
+
+
+class RadialTable(CameraTable, tag="radial", frozen=True):
+    """model = "radial": fisheye projections; fov is the full angle across the image circle."""
+
+    projection: Literal["paraboloid", "cosine_sphere", "equisolid", "equidistant"] = "paraboloid"
+    fov: Annotated[float, Meta(gt=0, le=360)] = 180.0
+
+
+class PinholeTable(CameraTable, tag="pinhole", frozen=True):
+    """model = "pinhole": fov is the angle across the width (default 60); or focal and centre in pixels."""
+
+    fov: Annotated[float, Meta(gt=0, lt=180)] | None = None
+    focal: tuple[Positive, Positive] | None = None
+    center: tuple[float, float] | None = None  # default: the middle of the image
+
+
+class OrthographicTable(CameraTable, tag="orthographic", frozen=True):
+    """model = "orthographic": scale in pixels per scene unit; the default shows all meshes."""
+
+    scale: Positive | None = None
+
+
+class DirectionalTable(Table, tag_field="type", tag="directional", frozen=True):
+    """[[light]] type = "directional": direction is the way that the light travels."""
+
+    direction: Vector
+    radiance: Color = 1.0
+
+
+class PointTable(Table, tag_field="type", tag="point", frozen=True):
+    """[[light]] type = "point": intensity is what arrives at distance 1."""
+
+    position: Vector
+    intensity: Color = 1.0
+
+
+class LevelsTable(Table, frozen=True):
+    levels: Annotated[list[Annotated[int, Meta(ge=0, le=7)]], Meta(min_length=1)]
+
+
+class ResolutionsTable(Table, frozen=True):
+    resolutions: Annotated[list[Annotated[int, Meta(ge=1, le=16384)]], Meta(min_length=1)]
+
+
+Method = Literal["invert", "vertex", "cubemap", "hemicube", "raytrace"]
+
+
+class CompareTable(Table, frozen=True):
+    """[compare]: what `mpcam compare` runs; a key that is left out is chosen there."""
+
+    methods: Annotated[list[Method], Meta(min_length=1)] | None = None
+    vertex: LevelsTable | None = None
+    cubemap: ResolutionsTable | None = None
+    hemicube: ResolutionsTable | None = None
+    shading: Literal["color", "normal", "texture", "light"] | None = None
+    repeats: Annotated[int, Meta(ge=1)] | None = None
+
+
+class SceneTable(Table, frozen=True):
+    """The whole file. Without `light`, one directional light comes from behind the camera; `light = []` means none."""
+
+    mesh: list[MeshTable]
+    camera: RadialTable | PinholeTable | OrthographicTable | None = None
+    light: list[DirectionalTable | PointTable] | None = None
+    ambient: Color = 0.15
+    background: Color = 0.0
+    compare: CompareTable = CompareTable()
+    name: str | None = None

@@ -1,0 +1,123 @@
+"""Boxes hold the whole image of a triangle, and are tight: against dense sampling, every model, all three libraries."""
+
+import drjit.llvm as types
+import numpy as np
+import pytest
+from catalogue import NAMES, cameras, triangles
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mpcam as mp
+
+STEPS = 40
+_ROWS = np.array([(i, j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]) / STEPS
+WEIGHTS = np.stack([_ROWS[:, 0], _ROWS[:, 1], 1 - _ROWS.sum(1)], -1)
+
+
+def extent(camera, corners):
+    """Extreme pixels of sampled points of triangles (N, 3, 3), and which triangles were seen at all."""
+    image = camera.project(np.einsum("mk,nkc->nmc", WEIGHTS, corners))
+    pixel, valid = image.pixel[..., 0, :], image.valid[..., 0]
+    low = np.where(valid[..., None], pixel, np.inf).min(1)
+    high = np.where(valid[..., None], pixel, -np.inf).max(1)
+    return low, high, valid.any(1)
+
+
+def assert_holds(box, low, high, seen, slack):
+    bad = seen & (~box.valid | (box.low > low + slack).any(-1) | (box.high < high - slack).any(-1))
+    assert not bad.any(), np.flatnonzero(bad)
+
+
+@pytest.fixture(params=NAMES)
+def camera(request):
+    return cameras(64)[request.param]
+
+
+def test_boxes_hold_every_sampled_point(camera):
+    corners = triangles(500, seed=3)
+    low, high, seen = extent(camera, corners)
+    assert seen.mean() > 0.1
+    assert_holds(camera.bound(corners), low, high, seen, 1e-9)
+
+
+def test_quick_boxes_hold_every_sampled_point(camera):
+    quick = getattr(camera, "local_bound_quick", None)
+    if quick is None:
+        assert not isinstance(camera, mp.Radial)
+        return
+    corners = triangles(500, seed=4)
+    low, high, seen = extent(camera, corners)
+    box = quick(*(np.moveaxis(corners[:, i], -1, 0) for i in range(3)))
+    assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 1e-9)
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_boxes_hold_in_float32_kernels(camera, quick):
+    corners = triangles(500, seed=5)
+    low, high, seen = extent(camera, corners)
+    method = getattr(camera, "local_bound_quick", camera.local_bound) if quick else camera.local_bound
+    box = method(*(types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)))
+    # Half a pixel of slack is what the kernels add; float32 may move a box by far less.
+    box = mp.Box(*(np.asarray(array.numpy()) for array in box))
+    assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 2e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(NAMES),
+    st.lists(st.floats(-1, 1), min_size=9, max_size=9),
+    st.floats(-6, 3),
+    st.integers(0, 2),
+)
+def test_boxes_hold_for_adversarial_triangles(name, numbers, exponent, copies):
+    """Needles, repeated corners, corners at the eye, on the axis, on the horizon and on the camera plane."""
+    camera = cameras(64)[name]
+    corners = np.array(numbers).reshape(1, 3, 3) * 10.0**exponent
+    if copies:
+        corners[:, copies] = corners[:, 0]
+    low, high, seen = extent(camera, corners)
+    assert_holds(camera.bound(corners), low, high, seen, 1e-6)
+
+
+@pytest.mark.parametrize("name", ["paraboloid", "cosine_sphere", "equisolid", "equidistant", "user, convex"])
+def test_boxes_are_tight_for_triangles_in_view(name):
+    """Not more than a tenth of a pixel (of 512) beyond the extreme points of densely sampled edges."""
+    camera = cameras(512)[name]
+    corners = triangles(500, seed=6)
+    corners[..., 2] = np.abs(corners[..., 2]) + 1e-3
+    s = np.linspace(0, 1, 2001)[:, None]
+    edges = np.concatenate([corners[:, [i]] * (1 - s) + corners[:, [(i + 1) % 3]] * s for i in range(3)], 1)
+    pixel = camera.project(edges).pixel[..., 0, :]
+    box = camera.bound(corners)
+    excess = np.maximum(pixel.min(1) - box.low, box.high - pixel.max(1))
+    assert np.percentile(excess, 99) < 0.1
+    assert np.median(excess) < 1e-6
+
+
+def test_a_triangle_around_the_antipode_covers_the_rim():
+    camera = mp.Radial.equisolid(64, 64, fov=2 * np.pi)
+    box = camera.bound([[-1, -1, -1], [1, -1, -1], [0, 1, -1]])
+    assert np.allclose(box.low, 0, atol=1e-6)
+    assert np.allclose(box.high, 64, atol=1e-6)
+
+
+def test_a_triangle_out_of_view_has_no_box():
+    camera = mp.Radial.paraboloid(64, 64)
+    assert not camera.bound([[-1, -1, -2], [1, -1, -2], [0, 1, -2]]).valid
+    assert not mp.Pinhole(64, 64).bound([[-1, -1, -2], [1, -1, -2], [0, 1, -2]]).valid
+
+
+def test_bad_corners_have_no_box(camera):
+    corners = np.full((2, 3, 3), 1.0)
+    corners[0, 1, 2], corners[1, 0, 0] = np.nan, np.inf
+    box = camera.bound(corners)
+    assert not box.valid.any()
+    assert np.isfinite(box.low).all()
+
+
+def test_a_triangle_through_the_eye_may_be_anywhere():
+    camera = mp.Radial.paraboloid(64, 64)
+    box = camera.bound([[0, 0, 0], [1, 0, 1], [0, 1, 1]])
+    assert box.valid
+    assert (box.low <= 0.01).all()
+    assert (box.high >= 63.9).all()

@@ -1,0 +1,264 @@
+"""First hits: against Embree, against brute force in float64, and against what each method promises."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+from catalogue import NAMES, cameras, first_hits, soup
+
+import mpcam as mp
+
+METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
+
+
+def assert_agree(hits, truth, mismatch=2e-4, depth=1e-4, common=0.999):
+    """The tolerances of the project: hit or no hit, and depth on the common hits."""
+    assert (hits.mask != truth.mask).mean() <= mismatch
+    both = hits.mask & truth.mask
+    if both.any():
+        relative = np.abs(hits.depth[both] - truth.depth[both]) / truth.depth[both]
+        assert (relative <= depth).mean() >= common
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return {
+        "room": mp.builtin_mesh("quad_room"),
+        "temple": mp.builtin_mesh("temple"),
+        "soup": soup(3000, seed=11),
+        "sphere": mp.builtin_mesh("sphere", triangles=20480),
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("mesh", ["room", "temple", "soup", "sphere"])
+def test_invert_agrees_with_embree(name, mesh, meshes):
+    # Parallel rays have an absolute depth error, so that camera stands back; the others are in the middle of it all.
+    eye = (0.12, 0.07, 0.31) if name != "orthographic" else (-15.0, -20.0, 9.0)
+    camera = cameras(192, mp.look_at(eye, (0.5, 1.0, 0.7)))[name]
+    hits = mp.rasterize(camera, meshes[mesh])
+    truth = mp.rasterize(camera, meshes[mesh], method="raytrace")
+    assert_agree(hits, truth)
+    same = hits.mask & (hits.triangle == truth.triangle)
+    assert same.sum() > 0.995 * hits.mask.sum()
+    assert np.abs(hits.barycentric - truth.barycentric)[same].max(initial=0) < 0.02
+    ours, theirs = hits.points[same], truth.points[same]
+    assert np.percentile(np.linalg.norm(ours - theirs, axis=-1), 99.9, method="higher") < 1e-3 if same.any() else True
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_invert_agrees_with_brute_force_in_double_precision(name):
+    camera, mesh = cameras(40)[name], soup(300, seed=12)
+    if name == "orthographic":
+        camera = camera.with_pose(mp.look_at((-15.0, -20.0, 9.0), (0, 0, 0)))
+    hits = mp.rasterize(camera, mesh)
+    triangle, depth = first_hits(camera, mesh)
+    different = hits.triangle != triangle
+    assert different.mean() <= 2 / different.size * 2
+    same = ~different & (triangle >= 0)
+    assert np.allclose(hits.depth[same], depth[same], rtol=2e-4)
+
+
+def test_every_pixel_of_a_closed_room_is_hit():
+    """Neighbouring triangles leave no gap: inside a closed box, nothing is missed."""
+    rng = np.random.default_rng(5)
+    mesh = mp.builtin_mesh("sphere", triangles=1280)
+    for target in rng.normal(size=(6, 3)):
+        for camera in (
+            mp.Radial.equisolid(256, 256, mp.look_at((0.1, 0.2, -0.3), target), fov=2 * np.pi),
+            mp.Pinhole(256, 256, camera_from_world=mp.look_at((0.1, 0.2, -0.3), target)),
+        ):
+            hits = mp.rasterize(camera, mesh)
+            u, v = np.meshgrid(np.arange(256) + 0.5, np.arange(256) + 0.5)
+            assert np.array_equal(hits.mask, camera.ray(np.stack([u, v], -1)).valid)
+
+
+def test_edges_through_pixel_centres_leave_no_gap():
+    """Edges and corners exactly on pixel centres, also between meshes that repeat their vertices."""
+    k = np.arange(-4, 5) / 8.0
+    corners = np.array([[x, y, 1.0] for y in k for x in k])
+    number = np.arange(81).reshape(9, 9)
+    a, b, c, d = (number[i : 8 + i, j : 8 + j].ravel() for i, j in ((0, 0), (0, 1), (1, 1), (1, 0)))
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    camera = mp.Pinhole(64, 64, 64, 64, 32.5, 32.5)
+    for mesh in (mp.Mesh(corners, faces), mp.Mesh(corners[faces.ravel()], np.arange(faces.size).reshape(-1, 3))):
+        hits = mp.rasterize(camera, mesh)
+        assert hits.mask[1:64, 1:64].all()
+        assert np.allclose(hits.points[1:64, 1:64, 2], 1)
+
+
+def test_same_frame_twice_is_the_same_to_the_bit(meshes):
+    camera = mp.Radial.paraboloid(256, 256, mp.look_at((0.1, 0, 0.2), (1, 1, 1)))
+    frames = [mp.rasterize(camera, meshes["soup"]) for _ in range(3)]
+    for other in frames[1:]:
+        assert np.array_equal(frames[0].triangle, other.triangle)
+        assert np.array_equal(frames[0].depth, other.depth)
+        assert np.array_equal(frames[0].barycentric, other.barycentric)
+
+
+def test_ties_go_to_the_lower_triangle():
+    corners = np.array([[-1, -1, 2], [1, -1, 2], [0, 1, 2.0]])
+    mesh = mp.Mesh(np.tile(corners, (5, 1)), np.arange(15).reshape(5, 3))
+    hits = mp.rasterize(mp.Radial.equidistant(64, 64), mesh)
+    assert set(np.unique(hits.triangle)) == {-1, 0}
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1e-3, 1e5, 1e8])
+@pytest.mark.parametrize("offset", [0.0, 1e4])
+def test_scale_and_distance_from_the_origin_do_not_matter(scale, offset):
+    mesh = mp.builtin_mesh("temple")
+    shift = np.full(3, offset) * scale
+    eye, target = np.array([0.2, -0.1, 1.6]), np.array([1.0, 2.0, 1.9])
+    camera = mp.Radial.paraboloid(128, 128, mp.look_at(eye, target))
+    far = camera.with_pose(mp.look_at(eye * scale + shift, target * scale + shift))
+    moved = mp.Mesh(mesh.vertices * scale + shift, mesh.faces)
+    near_hits, far_hits = mp.rasterize(camera, mesh), mp.rasterize(far, moved)
+    assert (near_hits.mask != far_hits.mask).mean() <= 2e-4
+    both = near_hits.mask & far_hits.mask
+    assert (
+        np.percentile(np.abs(far_hits.depth[both] / scale - near_hits.depth[both]) / near_hits.depth[both], 99.9) < 1e-3
+    )
+
+
+def test_fields_are_worked_out_only_when_asked_for():
+    hits = mp.rasterize(mp.Radial.paraboloid(32, 32), mp.builtin_mesh("sphere"))
+    assert "device_weights" not in vars(hits)
+    _ = hits.depth
+    assert "device_weights" not in vars(hits)
+    assert hits.depth.dtype == np.float32
+    assert hits.triangle.dtype == np.int32
+    assert hits.barycentric.shape == (32, 32, 2)
+    assert hits.barycentric.dtype == np.float32
+
+
+def test_stats_count_tests_and_fragments():
+    mesh = mp.builtin_mesh("sphere", triangles=1280)
+    hits = mp.rasterize(mp.Radial.paraboloid(256, 256), mesh)
+    assert hits.stats.rendered >= hits.mask.sum()
+    assert hits.stats.tests >= hits.stats.rendered
+    assert 1 <= hits.stats.overdraw < 3
+    assert hits.stats.overdraw == hits.stats.tests / hits.stats.rendered
+
+
+def test_large_and_small_triangles_meet():
+    """Triangles that one lane walks, and those that are cut into blocks, in one scene, image not a multiple of 8."""
+    mesh = mp.Mesh.concatenate(
+        [
+            mp.builtin_mesh("quad_room"),
+            mp.builtin_mesh("sphere", triangles=20480).transformed(np.diag([0.2, 0.2, 0.2, 1.0])),
+        ]
+    )
+    camera = mp.Radial.equidistant(203, 157, mp.look_at((0.9, 0.1, 0.3), (0, 0, 0)), fov=1.2 * np.pi)
+    assert_agree(mp.rasterize(camera, mesh), mp.rasterize(camera, mesh, method="raytrace"))
+
+
+def test_scenes_beyond_the_pair_budget_are_done_in_chunks(monkeypatch):
+    import mpcam_kernels.pipeline as kernels
+    from mpcam.rendering import buffered
+
+    camera = mp.Radial.paraboloid(136, 136, mp.look_at((0.1, 0, 0.2), (1, 1, 1)))
+    mesh = soup(400, seed=14)
+    whole = mp.rasterize(camera, mesh)
+    buffered._pipeline.cache_clear()
+    monkeypatch.setattr(kernels, "PAIRS", 700)
+    chunked = mp.rasterize(camera, mesh)
+    buffered._pipeline.cache_clear()
+    assert np.array_equal(whole.triangle, chunked.triangle)
+    assert np.array_equal(whole.depth, chunked.depth)
+
+
+def test_moving_scene_equals_a_new_mesh():
+    mesh = mp.builtin_mesh("sphere", triangles=1280)
+    camera = mp.Radial.equisolid(96, 96, mp.look_at((0, 0, 3), (0, 0, 0)))
+    moved = mesh.transformed(np.array([[1, 0, 0, 0.3], [0, 0.5, 0, 0], [0, 0, 1, -0.2], [0, 0, 0, 1.0]]))
+    for method in METHODS:
+        prepared = mp.prepare(camera, mesh, method)
+        before = prepared.frame()
+        prepared.update(moved.vertices)
+        after = prepared.frame()
+        expected = mp.rasterize(camera, moved, method=method)
+        assert (after.mask != expected.mask).mean() <= 2e-4, method
+        assert not np.array_equal(before.mask, after.mask)
+
+
+def test_prepared_stages_are_named():
+    camera, mesh = mp.Radial.paraboloid(64, 64), mp.builtin_mesh("quad_room")
+    stages = {method: set(mp.prepare(camera, mesh, method).stages()) for method in METHODS}
+    assert {"vertices", "triangles", "decode"} <= stages["invert"]
+    assert stages["raytrace"] == {"build", "trace"}
+    assert stages["cubemap"] == {"faces", "resample"}
+
+
+def test_a_mesh_leaves_the_device_with_its_last_user():
+    from mpcam.rendering.device import device_mesh
+
+    mesh = mp.builtin_mesh("cube")
+    held = weakref.ref(device_mesh(mesh))
+    mp.rasterize(mp.Pinhole(8, 8), mesh)
+    del mesh
+    gc.collect()
+    assert held() is None
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_to_see(method):
+    """No faces, no faces in view, zero area, NaN, infinity: no hits, no complaint."""
+    camera = mp.Radial.paraboloid(24, 24)
+    behind = [[-1, -1, -2], [1, -1, -2], [0, 1, -2]]
+    line = [[0, 0, 1], [0, 1, 2], [0, 2, 3]]
+    bad = [[np.nan, 0, 1], [1, 0, 1], [0, 1, 1]]
+    infinite = [[np.inf, 0, 1], [1, 0, 1], [0, 1, 1]]
+    for corners in ([], behind, line, bad, infinite, [*behind, *line, *bad, *infinite]):
+        mesh = mp.Mesh(np.array(corners).reshape(-1, 3), np.arange(len(corners)).reshape(-1, 3))
+        hits = mp.rasterize(camera, mesh, method=method)
+        assert not hits.mask.any()
+        assert np.isinf(hits.depth).all()
+        assert (hits.barycentric == 0).all()
+        if method != "cubemap":  # it looks behind itself too
+            assert hits.stats.rendered == 0
+        assert mp.render(camera, mesh, method=method).shape == (24, 24, 3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_bad_triangles_do_not_hide_good_ones(method):
+    good = [[-1, -1, 1], [1, -1, 1], [0, 1, 1]]
+    bad = [[np.nan, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5]]
+    mesh = mp.Mesh(np.array([*bad, *good]), [[0, 1, 2], [3, 4, 5], [3, 3, 4]])
+    hits = mp.rasterize(mp.Radial.paraboloid(24, 24), mesh, method=method)
+    assert hits.mask.any()
+    assert set(np.unique(hits.triangle)) == {-1, 1}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_pixel(method):
+    mesh = mp.Mesh([[-1, -1, 1], [1, -1, 1], [0, 1, 1]], [[0, 1, 2]])
+    hits = mp.rasterize(mp.Radial.equidistant(1, 1), mesh, method=method)
+    assert hits.triangle.tolist() == [[0]]
+    if method != "vertex":  # its depth is linear in an image of one pixel
+        assert abs(hits.depth[0, 0] - 1) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda c, m: mp.rasterize(c, m, method="magic"), "allowed are invert, vertex"),
+        (lambda c, m: mp.rasterize(c, m, bound="loose"), "allowed are tight"),
+        (lambda c, m: mp.rasterize(c, m, level=2), "no setting 'level': allowed are bound"),
+        (lambda c, m: mp.rasterize(c, m, method="raytrace", level=2), "allowed are none"),
+        (lambda c, m: mp.rasterize(c, m, method="vertex", level=1.5), "whole number from 0 to 7"),
+        (lambda c, m: mp.rasterize(c, m, method="cubemap", resolution=0), "pixels from 1 to 16384"),
+        (lambda c, m: mp.rasterize(mp.Orthographic(8, 8), m, method="cubemap"), "one centre, not Orthographic"),
+        (lambda c, m: mp.rasterize(mp.Radial.equidistant(8, 8, fov=4.0), m, method="hemicube"), "use method='cubemap'"),
+        (lambda c, m: mp.rasterize("camera", m), "camera is a str"),
+        (lambda c, m: mp.rasterize(c, "mesh"), "mpcam.Mesh is needed, got str"),
+        (lambda c, m: mp.shade(mp.rasterize(c, m), m, "toon"), "allowed are color, normal, texture, light"),
+        (lambda c, m: mp.shade(mp.rasterize(c, m), mp.builtin_mesh("sphere")), "give the scene that was rasterized"),
+        (lambda c, m: mp.interpolate(mp.rasterize(c, m), np.zeros((2, 2))), "per vertex or"),
+        (lambda c, m: mp.interpolate(mp.rasterize(c, m), np.array(["a"])), "numbers are needed"),
+    ],
+)
+def test_mistakes_are_named(call, words):
+    with pytest.raises(mp.InputError, match=words) as caught:
+        call(mp.Radial.paraboloid(8, 8), mp.builtin_mesh("cube"))
+    assert "\n" not in str(caught.value)
