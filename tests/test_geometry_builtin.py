@@ -1,5 +1,7 @@
 """The built-in meshes and scenes: counts, soundness, winding, determinism, and views."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,9 +18,14 @@ RANGES = {
 LIGHT = {"facade": 4_900, "temple": 4_000, "characters": 25_000, "patio": 60_000}
 
 
-@pytest.fixture(scope="module", params=builtin_mesh.names)
+@cache
+def built(name: str) -> Mesh:
+    return builtin_mesh(name, LIGHT.get(name))
+
+
+@pytest.fixture(params=builtin_mesh.names)
 def mesh(request) -> Mesh:
-    return builtin_mesh(request.param, LIGHT.get(request.param))
+    return built(request.param)
 
 
 def test_names():
@@ -36,7 +43,7 @@ def test_default_counts_are_those_of_the_paper(name):
 def test_counts_come_near_what_is_asked_for(name):
     low, high = RANGES[name]
     high = min(high, 250_000)
-    for count in np.geomspace(low, high, 9 if name in ("facade", "temple") else 4).round().astype(int):
+    for count in np.geomspace(low, high, 6 if name in ("facade", "temple") else 3).round().astype(int):
         assert builtin_mesh(name, int(count)).triangle_count == pytest.approx(count, rel=0.03)
 
 
@@ -88,7 +95,7 @@ def test_materials_are_in_use(mesh):
 
 @pytest.mark.parametrize("name", builtin_mesh.names)
 def test_the_same_every_time(name):
-    first, second = builtin_mesh(name, LIGHT.get(name)), builtin_mesh(name, LIGHT.get(name))
+    first, second = built(name), builtin_mesh(name, LIGHT.get(name))
     np.testing.assert_array_equal(first.vertices, second.vertices)
     np.testing.assert_array_equal(first.faces, second.faces)
 
@@ -106,7 +113,7 @@ def first_hits(mesh: Mesh, eye, directions) -> tuple[np.ndarray, np.ndarray]:
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = height / slope
             u, v = (turned[0] @ direction) / slope, (turned[1] @ direction) / slope
-        inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-9)
+            inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-9)
         nearest = np.where(inside, distance, np.inf)
         best = int(nearest.argmin())
         found.append(best if inside[best] else -1)
@@ -116,7 +123,7 @@ def first_hits(mesh: Mesh, eye, directions) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("name", [*PAPER, "quad_room"])
 def test_the_eye_sees_fronts_all_round(name):
-    mesh = builtin_mesh(name, LIGHT.get(name))
+    mesh = built(name)
     directions = np.random.default_rng(3).standard_normal((150, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     found, front = first_hits(mesh, (0.0, 0.0, 1.6), directions)
@@ -147,7 +154,7 @@ def test_closed_shapes_point_outwards(name):
 
 def test_characters_are_closed_bodies():
     """Every edge has one face on each side, whole scene but for the ground."""
-    mesh = builtin_mesh("characters", 25_000)
+    mesh = built("characters")
     points = np.round(mesh.vertices * 1e7).astype(np.int64)
     _, weld = np.unique(points, axis=0, return_inverse=True)
     faces = weld.reshape(-1)[mesh.faces[2:]]
@@ -191,4 +198,4 @@ def test_scenes_look_at_something(name):
     eye = np.asarray(ray.origin, float).reshape(-1, 3)[0]
     found, front = first_hits(scene.mesh, eye, np.asarray(ray.direction, float).reshape(-1, 3))
     assert front[found >= 0].all()
-    assert (found >= 0).mean() > 0.3
+    assert (found >= 0).mean() > (0.4 if name in PAPER else 0.1)

@@ -18,7 +18,6 @@ class _Recipe(NamedTuple):
     eye: tuple[float, float, float] = (0.0, 0.0, 1.6)
     target: tuple[float, float, float] = (1.0, 0.0, 1.6)
     sun: tuple[float, float, float] = (0.4, 0.5, -0.8)
-    brightness: float = 1.0
 
 
 _RECIPES = {
@@ -26,9 +25,9 @@ _RECIPES = {
     "temple": _Recipe("temple", 4_000, 2_200, 100_000, target=(1.0, 0.0, 2.1)),
     "characters": _Recipe("characters", 177_000, 25_000, 2_000_000, target=(0.0, 1.0, 1.25), sun=(-0.4, 0.5, -0.75)),
     "patio": _Recipe("patio", 560_000, 60_000, 3_000_000, target=(1.0, 0.25, 1.9)),
-    "sphere": _Recipe("plain", 1_280, 20, 1_310_720, eye=(0.0, -1.6, 0.0), target=(0.0, 0.0, 0.0)),
-    "plane": _Recipe("plain", 2, 2, 2_000_000, eye=(0.0, -0.5, 1.0), target=(0.0, 0.0, 0.0)),
-    "cube": _Recipe("plain", 12, 12, 1_200_000, eye=(-1.6, -2.2, 1.6), target=(0.0, 0.0, 0.0)),
+    "sphere": _Recipe("plain", 1_280, 20, 1_310_720, eye=(0.0, -1.25, 0.0), target=(0.0, 0.0, 0.0)),
+    "plane": _Recipe("plain", 2, 2, 2_000_000, eye=(0.0, -0.35, 0.5), target=(0.0, 0.0, 0.0)),
+    "cube": _Recipe("plain", 12, 12, 1_200_000, eye=(-1.3, -1.7, 1.4), target=(0.0, 0.0, 0.0)),
     "quad_room": _Recipe("plain", 12, 12, 1_200_000),
 }
 
@@ -81,8 +80,8 @@ def builtin_scene(name: str, width: int = 512, height: int = 512, triangles: int
     return Scene(
         (builtin_mesh(name, triangles),),
         camera=Radial.paraboloid(width, height, camera_from_world=look_at(recipe.eye, recipe.target)),
-        lights=(DirectionalLight(recipe.sun, (1.0, 0.96, 0.88)),),
-        ambient=(0.34, 0.37, 0.42),
+        lights=(DirectionalLight(recipe.sun, (0.8, 0.77, 0.7)),),
+        ambient=(0.28, 0.3, 0.34),
         background=(0.33, 0.55, 0.86),
         name=name,
     )

@@ -149,8 +149,8 @@ def _railing(builder: Builder, level: Level) -> None:
     profile += [(0.018, 0.62), (0.03, 0.68), (0.018, 0.74), (0.025, 0.82), (0.04, 0.88)]
     baluster = lathe(smooth_curve(profile, level(10, 4)), level(10, 5))
     builder.add(copies(baluster, placements(np.insert(spots, 2, _UPPER, axis=1))), painted("baluster", "#efe6d0"))
-    a, b, z0, z1 = 0.06, 0.0, _UPPER + 0.88, _UPPER + 0.96
+    a, z0, z1 = 0.06, _UPPER + 0.88, _UPPER + 0.96
     rails = [((-_IX - a, s * _IY - a, z0), (_IX + a, s * _IY + a, z1)) for s in (-1, 1)]
-    rails += [((s * _IX - a, -_IY + a + b, z0), (s * _IX + a, _IY - a - b, z1)) for s in (-1, 1)]
+    rails += [((s * _IX - a, a - _IY, z0), (s * _IX + a, _IY - a, z1)) for s in (-1, 1)]
     for low, high in rails:
         builder.add(boxes(low, high), painted("rail", "#6e4528"))

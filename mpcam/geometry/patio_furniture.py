@@ -97,11 +97,11 @@ def _chairs(builder: Builder, level: Level) -> None:
         copies(_curved(leg, level, 12, 10), placements([(a * 0.18, b * 0.17, 0.0) for a in (-1, 1) for b in (-1, 1)]))
     ]
     seat = boxes((-0.22, -0.21, 0.44), (0.22, 0.21, 0.47))
-    lines, around = level(8, 3), level(8, 4)
+    lines, around = level(8, 4), level(8, 4)
     for k in range(5):
         x = 0.075 * (k - 2)
         bow = smooth_curve([(x, 0.19, 0.47), (1.05 * x, 0.205, 0.7), (1.15 * x, 0.25, 0.93)], lines)
-        parts.append(loft(bow, np.full(lines, 0.011), around))
+        parts.append(loft(bow, np.where(np.arange(lines) < lines - 1, 0.011, 0.0), around))
     rail = smooth_curve(
         [(-0.23, 0.22, 0.9), (-0.12, 0.25, 0.945), (0.0, 0.255, 0.96), (0.12, 0.25, 0.945), (0.23, 0.22, 0.9)],
         level(20, 9),

@@ -177,5 +177,7 @@ def _trunks(builder: Builder, level: Level) -> None:
         widths[-1] = 0.0
         branch = loft(smooth_curve(knots, lines), widths, around)
         builder.add(copies(branch, placements([(x, y, 0.0) for x, y in _TREES])), bark)
-    stem = loft(smooth_curve([(0, 0, 0.4), (0.02, 0, 0.6), (0, 0, 0.9)], lines), np.linspace(0.05, 0.02, lines), around)
+    widths = np.linspace(0.05, 0.02, lines)
+    widths[-1] = 0.0
+    stem = loft(smooth_curve([(0, 0, 0.4), (0.02, 0, 0.6), (0, 0, 0.9)], lines), widths, around)
     builder.add(copies(stem, placements([(x, y, 0.0) for x, y in _PALMS + _SHRUBS])), bark)

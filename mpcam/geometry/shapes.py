@@ -3,7 +3,7 @@
 Every block winds counter-clockwise seen from outside, has no triangle without area, and makes many copies at once.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -284,11 +284,6 @@ def smooth_curve(knots, count: int) -> np.ndarray:
     t = (place - piece)[:, None]
     a, b, c, d = (padded[piece + k] for k in range(4))
     return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
-
-
-def tinted(part: Part, color) -> Part:
-    """The part with vertex colours."""
-    return replace(part, colors=np.broadcast_to(np.asarray(color, dtype=np.float64), part.vertices.shape))
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

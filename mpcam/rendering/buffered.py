@@ -57,9 +57,8 @@ class Buffered:
 
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
         if max(camera.width, camera.height) > MOST_PIXELS:
-            raise InputError(
-                f"the camera has {camera.width}x{camera.height} pixels: at most {MOST_PIXELS} along a side"
-            )
+            size = f"{camera.width}x{camera.height}"
+            raise InputError(f"the camera has {size} pixels: at most {MOST_PIXELS} along a side are possible")
         self.camera, self.mesh, self.test, self.curved = camera, mesh, test, test == "central"
         self.device = device_mesh(mesh)
         self.vertices, self.faces = self.device.vertices, self.device.faces
