@@ -137,7 +137,7 @@ def test_stats_count_tests_and_fragments():
     hits = mp.rasterize(mp.Radial.paraboloid(256, 256), mesh)
     assert hits.stats.rendered >= hits.mask.sum()
     assert hits.stats.tests >= hits.stats.rendered
-    assert 1 <= hits.stats.overdraw < 3
+    assert 1 <= hits.stats.overdraw < 5
     assert hits.stats.overdraw == hits.stats.tests / hits.stats.rendered
 
 

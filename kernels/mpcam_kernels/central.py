@@ -69,3 +69,20 @@ def may_hit(triangle: CentralTriangle, centre: Vector, spread: Float) -> Any:
         reach = dr.sqrt(dr.squared_norm(edge))
         possible = possible & (dr.dot(edge, centre) + reach * (spread + 1e-6) >= 0)
     return possible
+
+
+ROWS = 4  # rows of four numbers that a set-up packs into
+
+
+def pack(types: Any, triangle: CentralTriangle) -> list[Any]:
+    """The set-up in rows of four numbers."""
+    n = triangle.normal
+    rows = [types.Array4f(edge.x, edge.y, edge.z, part) for edge, part in zip(triangle.edges, n, strict=True)]
+    return [*rows, types.Array4f(triangle.offset, 0, 0, 0)]
+
+
+def unpack(rows: list[Any]) -> CentralTriangle:
+    """The set-up of a usable triangle from its rows."""
+    kind = type(rows[0].xyz)
+    edges = (rows[0].xyz, rows[1].xyz, rows[2].xyz)
+    return CentralTriangle(edges, kind(rows[0].w, rows[1].w, rows[2].w), rows[3].x, True)

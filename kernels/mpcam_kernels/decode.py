@@ -5,6 +5,7 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels.pipeline import EMPTY
+from mpcam_kernels.samples import places
 
 
 def triangles(types: Any, buffer: Any) -> Any:
@@ -16,6 +17,11 @@ def depths(types: Any, buffer: Any, scale: Any) -> Any:
     """Float depth of every pixel times `scale`, infinite where nothing is."""
     depth = dr.reinterpret_array(types.Float, types.UInt(buffer >> 32))
     return dr.select(buffer == types.UInt64(EMPTY), dr.inf, depth * scale)
+
+
+def in_rows(types: Any, kind: Any, values: Any, width: int, height: int) -> Any:
+    """Values kept in block order, row by row."""
+    return dr.gather(kind, values, places(types, width, height))
 
 
 def weights(types: Any, test: Any, positions: Any, faces: Any, triangle: Any, samples: Any) -> tuple[Any, Any]:

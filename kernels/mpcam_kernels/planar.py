@@ -9,12 +9,11 @@ Vector = Any
 
 
 class PlanarTriangle(NamedTuple):
-    """Edges as a corner and a direction (signed so that the inside is positive), corner depths, twice the area."""
+    """Edges as a corner and a direction (signed so that the inside is positive), and the corners' depths."""
 
     starts: tuple[Vector, Vector, Vector]
     steps: tuple[Vector, Vector, Vector]
     depths: Vector
-    area: Float
     usable: Any
 
 
@@ -32,7 +31,7 @@ def setup(a: Vector, b: Vector, c: Vector) -> PlanarTriangle:
     pairs = [_edge(p.xy, q.xy, flip) for p, q in ((b, c), (c, a), (a, b))]
     depths = type(a)(a.z, b.z, c.z)
     starts, steps = tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
-    return PlanarTriangle(starts, steps, depths, abs(area), area != 0)  # pyright: ignore[reportArgumentType]
+    return PlanarTriangle(starts, steps, depths, area != 0)  # pyright: ignore[reportArgumentType]
 
 
 def _edges(triangle: PlanarTriangle, pixel: Vector) -> list[Float]:
@@ -64,3 +63,18 @@ def may_hit(triangle: PlanarTriangle, centre: Vector, spread: Float) -> Any:
         reach = abs(step.x) + abs(step.y)
         possible = possible & (value + reach * (spread + 1e-3) >= 0)
     return possible
+
+
+ROWS = 4  # rows of four numbers that a set-up packs into
+
+
+def pack(types: Any, triangle: PlanarTriangle) -> list[Any]:
+    """The set-up in rows of four numbers."""
+    edges = [types.Array4f(p.x, p.y, s.x, s.y) for p, s in zip(triangle.starts, triangle.steps, strict=True)]
+    return [*edges, types.Array4f(triangle.depths.x, triangle.depths.y, triangle.depths.z, 0)]
+
+
+def unpack(rows: list[Any]) -> PlanarTriangle:
+    """The set-up of a usable triangle from its rows."""
+    starts, steps = (rows[0].xy, rows[1].xy, rows[2].xy), (rows[0].zw, rows[1].zw, rows[2].zw)
+    return PlanarTriangle(starts, steps, rows[3].xyz, True)

@@ -5,11 +5,12 @@ A triangle with all three corners out of view is left out: behind the eye its ed
 
 from typing import Any
 
-import drjit as dr
-
 from mpcam_kernels import planar
+from mpcam_kernels.planar import ROWS as ROWS
 from mpcam_kernels.planar import hit as hit
 from mpcam_kernels.planar import may_hit as may_hit
+from mpcam_kernels.planar import pack as pack
+from mpcam_kernels.planar import unpack as unpack
 from mpcam_kernels.planar import weights as weights
 
 
@@ -17,4 +18,4 @@ def setup(a: Any, b: Any, c: Any) -> planar.PlanarTriangle:
     """Edge functions; x, y of the corners are pixels, |z| their depths."""
     seen = (a.z > 0) | (b.z > 0) | (c.z > 0)
     shape = planar.setup(*(type(p)(p.x, p.y, abs(p.z)) for p in (a, b, c)))
-    return shape._replace(usable=shape.usable & seen, area=dr.select(seen, shape.area, 0.0))
+    return shape._replace(usable=shape.usable & seen)

@@ -115,14 +115,17 @@ class Buffered:
         from mpcam_kernels import decode
 
         vertices = self.vertices
-        small, depth = _frozen_decode()(buffer, self.unit if self.curved else opaque_one())
+        decode_frame = _frozen_decode(self.camera.width, self.camera.height)
+        small, depth = decode_frame(buffer, self.unit if self.curved else opaque_one())
         triangle = self.parent(small)
 
         def weights() -> tuple[Any, Any]:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
             test = kernel_test(self.test)
-            found = decode.weights(types(), test, self.place(vertices), self.faces, small, self.samples.pixels)
+            t, width, height = types(), self.camera.width, self.camera.height
+            samples = decode.in_rows(t, type(self.samples.pixels), self.samples.pixels, width, height)
+            found = decode.weights(t, test, self.place(vertices), self.faces, small, samples)
             return self.parent_weights(small, *found)
 
         def stats() -> Stats:
@@ -141,13 +144,14 @@ def opaque_one() -> Any:
 
 
 @functools.cache
-def _frozen_decode() -> Any:
+def _frozen_decode(width: int, height: int) -> Any:
 
     from mpcam_kernels import decode
     from mpcam_kernels.frozen import frozen
 
     @frozen
     def both(buffer: Any, unit: Any) -> tuple[Any, Any]:
-        return decode.triangles(types(), buffer), decode.depths(types(), buffer, unit)
+        found = decode.in_rows(types(), types().UInt64, buffer, width, height)
+        return decode.triangles(types(), found), decode.depths(types(), found, unit)
 
     return both

@@ -92,8 +92,8 @@ class Cubemapped:
 
     def _hits(self, buffers: list[Any]) -> Hits:
         look_up = _frozen_look_up(self.resolution, self.half)
-        samples = self.lens.directions.pixels
-        triangle, depth, texel = look_up(samples, buffers, self.unit)
+        ray = self.lens.ray
+        triangle, depth, texel = look_up(ray.direction, ray.valid, buffers, self.unit)
         vertices = self.faces[0].vertices
 
         def weights() -> tuple[Any, Any]:
@@ -180,18 +180,19 @@ def _texel_directions(texel: Any, resolution: int, half: bool) -> Any:
 def _frozen_look_up(resolution: int, half: bool) -> Any:
     import drjit as dr
 
-    from mpcam_kernels import decode
+    from mpcam_kernels import decode, samples
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def look_up(directions: Any, buffers: list[Any], unit: Any) -> tuple[Any, Any, Any]:
+    def look_up(directions: Any, valid: Any, buffers: list[Any], unit: Any) -> tuple[Any, Any, Any]:
         t = types()
         texel = _texel(directions, resolution, half)
-        valid = dr.squared_norm(directions) > 0
         found = t.UInt64(decode.EMPTY)
         for buffer, (width, height, start) in zip(buffers, _layout(resolution, half), strict=True):
             inside = valid & (texel >= start) & (texel < start + width * height)
-            found = dr.select(inside, dr.gather(t.UInt64, buffer, texel - start, inside), found)
+            local = texel - start
+            at = samples.place(local % width, local // width, width)
+            found = dr.select(inside, dr.gather(t.UInt64, buffer, at, inside), found)
         return decode.triangles(t, found), decode.depths(t, found, unit), texel
 
     return look_up

@@ -137,7 +137,7 @@ class Lens:
         from mpcam_kernels import samples
 
         _check_profile(getattr(camera, "profile", None))
-        self.on_device = device_lens(camera)
+        self.on_device, self.size = device_lens(camera), (camera.width, camera.height)
         self.ray = self.on_device.local_ray(samples.pixel_centres(types(), camera.width, camera.height))
         dr.eval(self.ray)
 
@@ -146,14 +146,14 @@ class Lens:
         """Samples of a central camera."""
         from mpcam_kernels import samples
 
-        return samples.central_samples(types(), lambda _: self.ray, self.on_device.width, self.on_device.height)
+        return samples.central_samples(types(), self.ray.direction, self.ray.valid, *self.size)
 
     @functools.cached_property
     def centres(self) -> Any:
         """Samples of the image plane, for straight-edged triangles."""
         from mpcam_kernels import samples
 
-        return samples.planar_samples(types(), self.on_device.width, self.on_device.height, self.ray.valid)
+        return samples.planar_samples(types(), self.ray.valid, *self.size)
 
 
 @functools.lru_cache(maxsize=16)
