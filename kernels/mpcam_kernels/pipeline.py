@@ -19,7 +19,7 @@ import drjit as dr
 from mpcam_kernels.frozen import frozen
 from mpcam_kernels.samples import BLOCK, Samples, blocks, place
 
-SMALL = 96  # pixels in a rectangle that one lane walks by itself
+SMALL = 48  # pixels in a rectangle that one lane walks by itself
 PER_LANE = 4  # pixels of a lane in the pass over blocks: 16 lanes share a block, and gather a triangle for 64 tests
 PAIRS = 1 << 18  # triangle-block pairs held at a time; a scene with more is processed in chunks
 EMPTY = 0xFFFFFFFFFFFFFFFF
