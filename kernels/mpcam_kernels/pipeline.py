@@ -2,9 +2,9 @@
 
 One pass over the triangles bounds each image by a rectangle of pixels. Triangles with a small rectangle are finished
 there: their lane walks the rectangle, and the nearest wins by an atomic minimum of depth << 32 | triangle. The others
-are cut into blocks of 8 x 8 pixels; blocks that one edge excludes are dropped, the rest are binned by block, and
-each lane takes four pixels through their block's list with the nearest in registers. The result does not depend on the order of
-execution: ties go to the lower number.
+are cut into blocks of 8 x 8 pixels; blocks that one edge excludes are dropped, the rest are binned by block, and each
+lane takes four pixels through their block's list with the nearest in registers. The result does not depend on the
+order of execution: ties go to the lower number.
 
 The kernels know arrays and functions only: `box` bounds a triangle's image, `test` is `central`, `planar` or
 `projected`.
@@ -219,9 +219,8 @@ class Pipeline:
         # The largest triangle number at an infinite depth stands for nothing: nothing is nearer than it and infinite.
         depths = [dr.fmin(dr.reinterpret_array(types.Float, types.UInt(value >> 32)), dr.inf) for value in before]
         state = (start, depths, [types.UInt(value) for value in before], types.UInt(0))
-        _, depths, triangles, covered = dr.while_loop(
-            state, lambda index, depths, triangles, covered: index < end, body
-        )
+        found: Any = dr.while_loop(state, lambda index, depths, triangles, covered: index < end, body)
+        _, depths, triangles, covered = found
         values = [_packed(types, depth, types.UInt64(t)) for depth, t in zip(depths, triangles, strict=True)]
         values = [dr.select(depth < dr.inf, v, EMPTY) for depth, v in zip(depths, values, strict=True)]
         result = dr.empty(types.UInt64, self.places)

@@ -103,5 +103,3 @@ def _block_bounds(types: Any, pixels: Any, count: int) -> tuple[Any, Any]:
     _, spreads = dr.while_loop((zero, dr.full(types.Float, -1.0, count)), lambda k, s: k < size, widen)
     dr.eval(centre, spreads)
     return centre, spreads
-
-

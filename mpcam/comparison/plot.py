@@ -23,8 +23,8 @@ STYLES = {
 OTHER = ("#8a6d00", "P")
 
 
-def draw(comparison: "Comparison", path: Path, error: str = "flip") -> None:
-    """Write a PNG with one log-log panel for each time column that was measured, the front drawn in each.
+def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ("flip", "projection_median")) -> None:
+    """Write a PNG with a row of log-log panels for each error, one for each time that was measured, with the front.
 
     Errors of zero have no place on a log axis: they stand in a band marked 0 below the smallest decade.
     """
@@ -32,75 +32,72 @@ def draw(comparison: "Comparison", path: Path, error: str = "flip") -> None:
 
     with matplotlib.style.context("default"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")  # a name in a script that the font lacks
-        _draw(comparison, path, error)
+        _draw(comparison, path, errors)
 
 
-def _draw(comparison: "Comparison", path: Path, error: str) -> None:
+def _draw(comparison: "Comparison", path: Path, errors: tuple[str, ...]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels = [name for name in ("still_ms", "moving_ms") if np.any(np.isfinite(comparison.column(name)))]
-    figure = Figure(figsize=(6.2 * max(len(panels), 1), 4.9), dpi=150, layout="constrained")
+    times = [name for name in ("still_ms", "moving_ms") if np.any(np.isfinite(comparison.column(name)))]
+    figure = Figure(figsize=(6.2 * max(len(times), 1), 0.6 + 4.1 * len(errors)), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
-    errors = comparison.column(error) * (100 if COLUMNS[error].unit == "%" else 1)
+    figure.suptitle(_plain(comparison.name), x=0.01, ha="left", fontsize=13, fontweight="bold")
+    panels, handles = [], {}
+    for row, error in enumerate(errors):
+        for column, time in enumerate(times):
+            axes = figure.add_subplot(len(errors), len(times), row * len(times) + column + 1)
+            panels.append((axes, *_panel(axes, comparison, error, time, handles)))
+            unit = COLUMNS[error].unit
+            axes.set_ylabel(COLUMNS[error].title + (f" ({unit})" if unit else "") if column == 0 else "")
+    if handles:
+        names = [_plain(name) for name in handles]
+        figure.legend(handles.values(), names, loc="outside lower center", ncols=len(handles), frameon=False)
+    labels = [_plain(row.setting.replace("level ", "L") or row.method) for row in comparison.rows]
+    colors = [STYLES.get(row.method, OTHER)[0] for row in comparison.rows]
+    for axes, x, y, usable in panels:
+        _label(figure, axes, x, y, labels, usable, colors)
+    figure.savefig(path)
+
+
+def _panel(
+    axes: Any, comparison: "Comparison", error: str, time: str, handles: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points, lines and front of one error against one time; returns where the points are, and which are shown."""
+    times, errors = comparison.column(time), comparison.column(error) * (100 if COLUMNS[error].unit == "%" else 1)
     positive = errors[np.isfinite(errors) & (errors > 0)]
     low = 10.0 ** np.floor(np.log10(positive.min() * 0.9)) if positive.size else 0.01
     high = max(positive.max() * 2 if positive.size else 1.0, low * 10)
     has_zero = bool(np.any(errors == 0))
     zero = low * 10**-0.45
-    figure.suptitle(_plain(comparison.name), x=0.01, ha="left", fontsize=13, fontweight="bold")
-    handles: dict[str, Any] = {}
-    for place, name in enumerate(panels):
-        axes = figure.add_subplot(1, len(panels), place + 1)
-        times = comparison.column(name)
-        usable = np.isfinite(times) & np.isfinite(errors)
-        shown = np.where(errors == 0, zero, errors)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.grid(True, which="major", color="#e3e3e0", linewidth=0.8)
-        axes.grid(True, which="minor", color="#f1f1ee", linewidth=0.6)
-        axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
-        front = np.flatnonzero(pareto_front(errors, times) & usable)
-        order = sorted(front, key=lambda i: (times[i], -errors[i]))
-        if order:
-            x = [times[order[0]], *np.repeat(times[order][1:], 2), times[usable].max() * 1.3]
-            y = [*np.repeat(shown[order], 2)]
-            line = axes.plot(x, y, color="#9a9a94", linewidth=5, alpha=0.35, solid_joinstyle="round", zorder=1)
-            handles["Pareto front"] = line[0]
-        for method in dict.fromkeys(row.method for row in comparison.rows):
-            color, marker = STYLES.get(method, OTHER)
-            index = [i for i, row in enumerate(comparison.rows) if row.method == method and usable[i]]
-            axes.plot(times[index], shown[index], color=color, linewidth=1, alpha=0.6, zorder=2)
-            handles[method] = axes.scatter(
-                times[index],
-                shown[index],
-                color=color,
-                marker=marker,
-                s=46,
-                zorder=3,
-                linewidths=0.8,
-                edgecolors="white",
-            )
-        span = times[usable] if usable.any() else np.array([1.0])
-        axes.set_xlim(span.min() / 1.35, span.max() * 1.7)
-        axes.set_ylim(low * (10**-0.8 if has_zero else 0.8), high)
-        _ticks(axes, low, zero if has_zero else None)
-        axes.set_xlabel(f"{COLUMNS[name].title}, median (ms)")
-        unit = COLUMNS[error].unit
-        axes.set_ylabel(COLUMNS[error].title + (f" ({unit})" if unit else "") if place == 0 else "")
-        labels = [_plain(row.setting.replace("level ", "L") or row.method) for row in comparison.rows]
-        _label(figure, axes, times, shown, labels, usable, [STYLES.get(r.method, OTHER)[0] for r in comparison.rows])
-    if handles:
-        figure.legend(
-            handles.values(),
-            [_plain(name) for name in handles],
-            loc="outside lower center",
-            ncols=len(handles),
-            frameon=False,
-        )
-    figure.savefig(path)
+    usable = np.isfinite(times) & np.isfinite(errors)
+    shown = np.where(errors == 0, zero, errors)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.grid(True, which="major", color="#e3e3e0", linewidth=0.8)
+    axes.grid(True, which="minor", color="#f1f1ee", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    front = np.flatnonzero(pareto_front(errors, times) & usable)
+    order = sorted(front, key=lambda i: (times[i], -errors[i]))
+    if order:
+        x = [times[order[0]], *np.repeat(times[order][1:], 2), times[usable].max() * 1.3]
+        y = [*np.repeat(shown[order], 2)]
+        line = axes.plot(x, y, color="#9a9a94", linewidth=5, alpha=0.35, solid_joinstyle="round", zorder=1)
+        handles["Pareto front"] = line[0]
+    for method in dict.fromkeys(row.method for row in comparison.rows):
+        color, marker = STYLES.get(method, OTHER)
+        index = [i for i, row in enumerate(comparison.rows) if row.method == method and usable[i]]
+        axes.plot(times[index], shown[index], color=color, linewidth=1, alpha=0.6, zorder=2)
+        place = (times[index], shown[index])
+        handles[method] = axes.scatter(*place, color=color, marker=marker, s=46, zorder=3, lw=0.8, ec="white")
+    span = times[usable] if usable.any() else np.array([1.0])
+    axes.set_xlim(span.min() / 1.35, span.max() * 1.7)
+    axes.set_ylim(low * (10**-0.8 if has_zero else 0.8), high)
+    _ticks(axes, low, zero if has_zero else None)
+    axes.set_xlabel(f"{COLUMNS[time].title}, median (ms)")
+    return times, shown, usable
 
 
 def _ticks(axes: Any, low: float, zero: float | None) -> None:

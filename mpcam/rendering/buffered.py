@@ -83,14 +83,21 @@ class Buffered:
         """Barycentric weights within that face."""
         return second, third
 
-    def buffer(self, clock: Clock | None = None, count: bool = False) -> tuple[Any, Any]:
-        """The depth buffer, and (tests, rendered) where they are to be counted."""
-        from mpcam_kernels.backend import backend_name
-
+    def buffer(self, clock: Clock | None = None) -> tuple[Any, Any]:
+        """Placed vertices and the depth buffer over them."""
         done = clock.done if clock else None
         positions = self.place(self.vertices) if self.mesh.triangle_count else self.vertices
         if done:
             done("vertices", positions)
+        return positions, self._run(positions, done, count=False)[0]
+
+    def count(self, positions: Any) -> np.ndarray:
+        """Tests and covered samples of a frame over placed vertices."""
+        return self._run(positions, None, count=True)[1].numpy()
+
+    def _run(self, positions: Any, done: Any, count: bool) -> tuple[Any, Any]:
+        from mpcam_kernels.backend import backend_name
+
         camera, model, static = None, None, ()
         if self.curved:
             camera, model = self.lens.on_device, type(self.camera)
@@ -101,37 +108,30 @@ class Buffered:
 
     def frame(self) -> Hits:
         """One frame, evaluated: triangle and depth of every pixel."""
-        return self._hits(self.buffer()[0])
+        return self._hits(*self.buffer())
 
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()
-        buffer, _ = self.buffer(clock)
-        self._hits(buffer)
+        self._hits(*self.buffer(clock))
         clock.done("decode")
         return clock.seconds
 
-    def _hits(self, buffer: Any) -> Hits:
-        from mpcam_kernels import decode
-
-        vertices = self.vertices
-        decode_frame = _frozen_decode(self.camera.width, self.camera.height)
-        small, depth = decode_frame(buffer, self.unit if self.curved else opaque_one())
+    def _hits(self, positions: Any, buffer: Any) -> Hits:
+        width, height, faces, samples = self.camera.width, self.camera.height, self.faces, self.samples.pixels
+        small, depth = _frozen_decode(width, height)(buffer, self.unit if self.curved else opaque_one())
         triangle = self.parent(small)
 
         def weights() -> tuple[Any, Any]:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
-            test = kernel_test(self.test)
-            t, width, height = types(), self.camera.width, self.camera.height
-            samples = decode.in_rows(t, type(self.samples.pixels), self.samples.pixels, width, height)
-            found = decode.weights(t, test, self.place(vertices), self.faces, small, samples)
+            found = _frozen_weights(self.test, width, height)(small, positions, faces, samples)
             return self.parent_weights(small, *found)
 
         def stats() -> Stats:
             if self.mesh.triangle_count == 0:
                 return Stats(0, 0)
-            tests, rendered = self.buffer(count=True)[1].numpy()
+            tests, rendered = self.count(positions)
             return Stats(int(tests), int(rendered))
 
         return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
@@ -155,3 +155,16 @@ def _frozen_decode(width: int, height: int) -> Any:
         return decode.triangles(types(), found), decode.depths(types(), found, unit)
 
     return both
+
+
+@functools.cache
+def _frozen_weights(test: str, width: int, height: int) -> Any:
+    from mpcam_kernels import decode
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def weights(triangle: Any, positions: Any, faces: Any, samples: Any) -> tuple[Any, Any]:
+        views = decode.in_rows(types(), type(samples), samples, width, height)
+        return decode.weights(types(), kernel_test(test), positions, faces, triangle, views)
+
+    return weights

@@ -79,22 +79,22 @@ class Cubemapped:
 
     def frame(self) -> Hits:
         """One frame, evaluated."""
-        return self._hits([face.buffer()[0] for face in self.faces])
+        return self._hits([face.buffer() for face in self.faces])
 
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()
-        buffers = [face.buffer()[0] for face in self.faces]
-        clock.done("faces", buffers)
-        self._hits(buffers)
+        frames = [face.buffer() for face in self.faces]
+        clock.done("faces", frames)
+        self._hits(frames)
         clock.done("resample")
         return clock.seconds
 
-    def _hits(self, buffers: list[Any]) -> Hits:
+    def _hits(self, frames: list[tuple[Any, Any]]) -> Hits:
+        buffers = [buffer for _, buffer in frames]
         look_up = _frozen_look_up(self.resolution, self.half)
         ray = self.lens.ray
         triangle, depth, texel = look_up(ray.direction, ray.valid, buffers, self.unit)
-        vertices = self.faces[0].vertices
 
         def weights() -> tuple[Any, Any]:
             import drjit as dr
@@ -105,14 +105,14 @@ class Cubemapped:
                 return depth * 0.0, depth * 0.0
             directions = _texel_directions(texel, self.resolution, self.half)
             front = self.faces[0]  # its frame is the camera's own
-            found = decode.weights(types(), central, front.place(vertices), front.faces, triangle, directions)
+            found = decode.weights(types(), central, frames[0][0], front.faces, triangle, directions)
             dr.eval(found)
             return found
 
         def stats() -> Stats:
             if self.mesh.triangle_count == 0:
                 return Stats(0, 0)
-            counts = np.sum([face.buffer(count=True)[1].numpy() for face in self.faces], 0)
+            counts = np.sum([face.count(placed) for face, (placed, _) in zip(self.faces, frames, strict=True)], 0)
             return Stats(int(counts[0]), int(counts[1]))
 
         return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
