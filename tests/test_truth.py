@@ -43,7 +43,7 @@ def test_sensor_traces_the_rays_of_the_camera(name):
 def test_pinhole_sensor_is_mitsubas_own():
     """Same field of view, orientation and pixel grid as the plugin `perspective`, which has x left and y up."""
     camera = mp.Pinhole.from_fov(80, 60, 1.3, EYE)
-    to_world = mi.ScalarTransform4f(np.linalg.inv(EYE) @ np.diag([-1, -1, 1, 1.0]))
+    to_world = mi.ScalarTransform4f((np.linalg.inv(EYE) @ np.diag([-1, -1, 1, 1.0])).tolist())
     film = {"type": "hdrfilm", "width": 80, "height": 60, "rfilter": {"type": "box"}}
     own = {"type": "perspective", "fov": np.degrees(1.3), "fov_axis": "x", "to_world": to_world, "film": film}
     own["near_clip"] = 1e-5  # where Mitsuba's rays start
@@ -57,7 +57,7 @@ def test_pinhole_sensor_is_mitsubas_own():
 def test_orthographic_sensor_is_mitsubas_own():
     camera = mp.Orthographic(64, 64, 32, camera_from_world=mp.look_at((0, -4, 1), (0, 0, 0)))
     pose = np.asarray(camera.camera_from_world)
-    to_world = mi.ScalarTransform4f(np.linalg.inv(pose) @ np.diag([-1, -1, 1, 1.0]))
+    to_world = mi.ScalarTransform4f((np.linalg.inv(pose) @ np.diag([-1, -1, 1, 1.0])).tolist())
     film = {"type": "hdrfilm", "width": 64, "height": 64, "rfilter": {"type": "box"}}
     mesh = mp.builtin_mesh("sphere", triangles=1280).transformed(np.diag([0.7, 0.7, 0.7, 1]))
     ours = depth_image(mp.truth.sensor(camera, 256), mesh, 256)
