@@ -10,12 +10,15 @@ if TYPE_CHECKING:
     from mpcam.cameras import Box as Box
     from mpcam.cameras import Camera as Camera
     from mpcam.cameras import Domain as Domain
+    from mpcam.cameras import DoubleSphere as DoubleSphere
+    from mpcam.cameras import KannalaBrandt as KannalaBrandt
     from mpcam.cameras import Orthographic as Orthographic
     from mpcam.cameras import Pinhole as Pinhole
     from mpcam.cameras import Profile as Profile
     from mpcam.cameras import Projection as Projection
     from mpcam.cameras import Radial as Radial
     from mpcam.cameras import Ray as Ray
+    from mpcam.cameras import UnifiedOmni as UnifiedOmni
     from mpcam.cameras import custom_profile as custom_profile
     from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
     from mpcam.geometry.scene import DirectionalLight as DirectionalLight
     from mpcam.geometry.scene import PointLight as PointLight
     from mpcam.geometry.scene import Scene as Scene
+    from mpcam.io.calibration import read_calibration as read_calibration
+    from mpcam.io.calibration import write_calibration as write_calibration
     from mpcam.io.images import read_camera as read_camera
     from mpcam.io.images import read_channels as read_channels
     from mpcam.io.images import read_image as read_image
@@ -45,7 +50,10 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "mpcam.cameras": ("Box Camera Domain Orthographic Pinhole Profile Projection Radial Ray custom_profile look_at"),
+    "mpcam.cameras": (
+        "Box Camera Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray UnifiedOmni "
+        "custom_profile look_at"
+    ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
     "mpcam.errors": "InputError SetupError",
@@ -53,6 +61,7 @@ _HOMES = {
     "mpcam.geometry.load": "load_mesh",
     "mpcam.geometry.mesh": "Material Mesh",
     "mpcam.geometry.scene": "DirectionalLight PointLight Scene",
+    "mpcam.io.calibration": "read_calibration write_calibration",
     "mpcam.io.images": "read_camera read_channels read_image write_image",
     "mpcam.io.scenes": "load_scene",
     "mpcam.rendering.hits": "Hits",
@@ -61,7 +70,7 @@ _HOMES = {
     "mpcam.rendering.shade": "shade",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
-_SUBPACKAGES = ("cameras", "comparison", "geometry", "io", "math", "rendering", "truth")
+_SUBPACKAGES = ("cameras", "comparison", "geometry", "io", "math", "rendering", "stress", "truth")
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 

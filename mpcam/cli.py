@@ -193,6 +193,34 @@ def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=Tr
 
 
 @app.command
+def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json: bool = False) -> int:
+    """Run a camera model on its stiff and extreme cases, against 50 digits and dense sampling.
+
+    Args:
+        model: radial.
+        triangles: Random triangles per camera whose boxes are checked.
+        points: Points per camera and kind whose images are checked.
+        json: Print the cases as JSON.
+    """
+    from rich.console import Console
+
+    from mpcam.comparison.progress import bar
+    from mpcam.stress import MODELS, report, suite
+
+    if model not in MODELS:
+        raise InputError(f"stress {model!r}: allowed are {', '.join(MODELS)}")
+    _check_machine()
+    chosen = suite(model)
+    with bar(Console(stderr=True), f"stress {model}") as progress:
+        cases = chosen.run(triangles, points, progress)
+    if json:
+        _print_json(report.as_dicts(cases))
+    else:
+        report.print_cases(cases, chosen.LIMIT, Console(width=None if sys.stdout.isatty() else 110))
+    return 0 if all(case.good(chosen.LIMIT) for case in cases) else EXIT_FAILURE
+
+
+@app.command
 def doctor(*, json: bool = False) -> int:
     """Say whether this machine is fit to run mpcam, and what to install if it is not.
 

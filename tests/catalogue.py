@@ -23,6 +23,9 @@ def cameras(size: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Came
         "user, convex": mp.Radial.from_function(w, h, lambda theta: tan(theta / 3), pose),
         "user, not convex": mp.Radial.from_function(w, h, lambda theta: theta + theta**3, pose),
         "pinhole": mp.Pinhole(w, h, 0.6 * w, 0.55 * w, 0.47 * w, 0.52 * h, pose),
+        "kannala_brandt": mp.KannalaBrandt(w, h, 0.31 * w, 0.3 * w, 0.48 * w, 0.51 * h, (0.05, -0.01, 0, 0), pose),
+        "double_sphere": mp.DoubleSphere(w, h, 0.37 * w, 0.38 * w, 0.52 * w, 0.49 * h, -0.2, 0.59, pose),
+        "unified_omni": mp.UnifiedOmni(w, h, 0.4 * w, 0.39 * w, 0.51 * w, 0.48 * h, 0.45, 1.1, pose),
         "orthographic": mp.Orthographic(w, h, 0.4 * w, camera_from_world=pose),
     }
 

@@ -95,6 +95,35 @@ def test_boxes_are_tight_for_triangles_in_view(name):
     assert np.median(excess) < 1e-6
 
 
+@pytest.mark.parametrize("name", ["equisolid 360", "equidistant 270", "paraboloid 270"])
+@pytest.mark.parametrize("method", ["local_bound", "local_bound_quick", "local_bound_quads"])
+def test_boxes_hold_edges_that_pass_behind_the_eye(name, method):
+    """Near the point behind the eye an image runs half around the rim within a tiny part of an edge."""
+    camera = cameras(512)[name]
+    corners = triangles(600, seed=8) * [1, 1, 0.3] - [0, 0, 1.0]
+    s = np.linspace(0, 1, 1501)[:, None]
+    edges = np.concatenate([corners[:, [i]] * (1 - s) + corners[:, [(i + 1) % 3]] * s for i in range(3)], 1)
+    image = camera.project(edges)
+    pixel, valid = image.pixel[..., 0, :], image.valid[..., 0]
+    low = np.where(valid[..., None], pixel, np.inf).min(1)
+    high = np.where(valid[..., None], pixel, -np.inf).max(1)
+    box = getattr(camera, method)(*(np.moveaxis(corners[:, i], -1, 0) for i in range(3)))
+    assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, valid.any(1), 1e-6)
+
+
+@pytest.mark.parametrize("name", ["paraboloid", "cosine_sphere", "equisolid", "equidistant", "narrow"])
+def test_quads_hold_every_sampled_point(name):
+    """Gascuel et al. 2008, 3.4: looser than the tight boxes, but nothing is missed."""
+    camera = cameras(64)[name]
+    corners = triangles(500, seed=9)
+    low, high, seen = extent(camera, corners)
+    assert isinstance(camera, mp.Radial)
+    box = camera.local_bound_quads(*(np.moveaxis(corners[:, i], -1, 0) for i in range(3)))
+    assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 1e-9)
+    tight = camera.bound(corners)
+    assert (box.high - box.low).prod(0)[seen].mean() > (tight.high - tight.low).prod(-1)[seen].mean()
+
+
 def test_a_triangle_around_the_antipode_covers_the_rim():
     camera = mp.Radial.equisolid(64, 64, fov=2 * np.pi)
     box = camera.bound([[-1, -1, -1], [1, -1, -1], [0, 1, -1]])

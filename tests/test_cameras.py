@@ -149,9 +149,25 @@ def test_double_precision_on_dr_jit(camera):
     assert np.abs(device.pixel[0].numpy().T[inside] - exact.pixel[inside, 0]).max() < 1e-6
 
 
-def _number_fields(camera):
-    names = [field.name for field in dataclasses.fields(camera)]
-    return [name for name in names if name not in (*camera.static_fields, "camera_from_world")]
+def _numbers(camera):
+    """Every number of a camera as (field, index); index None for fields that are one number."""
+    names = [field.name for field in dataclasses.fields(camera) if field.init]
+    names = [name for name in names if name not in (*camera.static_fields, "camera_from_world")]
+    values = {name: getattr(camera, name) for name in names}
+    return [(n, i) for n, v in values.items() for i in (range(len(v)) if isinstance(v, tuple) else (None,))]
+
+
+def _number(camera, name, index):
+    value = getattr(camera, name)
+    return value if index is None else value[index]
+
+
+def _changed(camera, name, index, value):
+    """The camera with one of its numbers replaced."""
+    if index is not None:
+        several = getattr(camera, name)
+        value = (*several[:index], value, *several[index + 1 :])
+    return dataclasses.replace(camera, **{name: value})
 
 
 def test_jax_gradients_of_projection_match_differences(camera):
@@ -167,17 +183,17 @@ def test_jax_gradients_of_projection_match_differences(camera):
             exact = np.asarray(jax.jacobian(pixel_of_point)(jnp.asarray(point)))
             differences = _differences(lambda p: camera.project(p).pixel[0], point)
             assert np.abs(exact - differences).max() < 1e-5 * np.abs(differences).max()
-        for name in _number_fields(camera):
-            start = float(getattr(camera, name))
+        for name, index in _numbers(camera):
+            start = float(_number(camera, name, index))
 
-            def pixel(value, name=name):
-                return dataclasses.replace(camera, **{name: value}).project(points).pixel
+            def pixel(value, name=name, index=index):
+                return _changed(camera, name, index, value).project(points).pixel
 
             exact = np.asarray(jax.jacobian(lambda v, f=pixel: jnp.asarray(f(v)))(jnp.asarray(start)))
             step = 1e-6 * max(1.0, abs(start))
             differences = (
                 (pixel(start - step) - pixel(start - 3 * step)) / (2 * step)
-                if name == "fov"
+                if name in ("fov", "max_angle")  # which may be the largest allowed
                 else (pixel(start + step) - pixel(start - step)) / (2 * step)
             )
             assert np.abs(exact - differences).max() < 1e-4 * max(1.0, np.abs(differences).max()), name
@@ -205,7 +221,7 @@ def test_jax_gradients_of_rays_match_differences(camera):
 def test_camera_is_a_jax_pytree(camera):
     with jax.enable_x64(True):
         leaves, tree = jax.tree_util.tree_flatten(camera)
-        assert len(leaves) == 1 + len(_number_fields(camera))
+        assert len(leaves) == 1 + len(_numbers(camera))
         assert jax.tree_util.tree_unflatten(tree, leaves) == camera
 
         @jax.jit
@@ -228,6 +244,15 @@ def test_bad_numbers_are_invalid_not_nan(camera):
     assert not ray.valid.any()
     assert np.isfinite(ray.direction).all()
     assert np.isfinite(ray.origin).all()
+
+
+@pytest.mark.parametrize("name", ["equisolid", "equidistant"])
+def test_straight_behind_a_full_view_lies_the_rim(name):
+    camera = getattr(mp.Radial, name)(512, 512, fov=2 * np.pi)
+    image = camera.project([[0, 0, -1.0], [1e-200, 0, -2.0]])
+    assert image.valid.all()
+    assert np.allclose(image.pixel[:, 0], [512, 256])
+    assert np.allclose(camera.ray(image.pixel[0, 0]).direction, [0, 0, -1], atol=1e-7)
 
 
 def test_central_cameras_have_no_image_of_their_centre(camera):

@@ -46,7 +46,7 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("frobnicate", "compare, render, project, doctor"),
+        ("frobnicate", "compare, render, project, stress, doctor"),
         ("render", "SCENE"),
         ("render cube", "--output"),
         ("render cube --output a.png --frobnicate", "--frobnicate"),

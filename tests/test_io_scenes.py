@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpcam.cameras import Orthographic, Pinhole, Radial, look_at
+from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni, look_at
 from mpcam.errors import InputError
 from mpcam.geometry.builtin import builtin_mesh
 from mpcam.geometry.scene import DirectionalLight, PointLight
@@ -164,6 +164,9 @@ def test_texture_is_linear_and_replaces_materials(scene):
         'model = "pinhole"\nfocal = [900, 500]\ncenter = [250, 251]',
         'model = "orthographic"',
         'model = "orthographic"\nsize = [40, 90]',
+        'model = "kannala_brandt"\nfocal = [150, 151]\nk = [0.05, -0.01, 0, 0]',
+        'model = "double_sphere"\nfocal = [200, 201]\nxi = -0.2\nalpha = 0.59\nsize = [640, 200]',
+        'model = "unified_omni"\nfocal = [200, 201]\nalpha = 0.55\nfov = 150',
     ],
 )
 @pytest.mark.parametrize("place", ["", "scale = [5, 1, 0.1]", "scale = 1e-6\ntranslate = [0, 0, 3]", "scale = 1e9"])
@@ -186,6 +189,20 @@ def test_pinhole_and_orthographic_numbers(scene):
     camera = scene(f'{MESH}[camera]\nmodel = "orthographic"\nscale = 25\n{pose}').scene.camera
     assert isinstance(camera, Orthographic)
     assert camera.scale == 25
+
+
+def test_numbers_of_lenses(scene):
+    def camera(keys):
+        return scene(f"{MESH}[camera]\nsize = [80, 60]\nfocal = [50, 60]\n{keys}").scene.camera.with_pose(np.eye(4))
+
+    frame = (80, 60, 50, 60, 40, 30)
+    assert camera('model = "kannala_brandt"') == KannalaBrandt(*frame, (0, 0, 0, 0))
+    lens = camera('model = "kannala_brandt"\nk = [0.1, 0, 0.3, 0]\nfov = 180')
+    assert lens == KannalaBrandt(*frame, (0.1, 0, 0.3, 0), max_angle=np.pi / 2)
+    lens = camera('model = "double_sphere"\nxi = -0.2\nalpha = 0.6\ncenter = [41, 29]')
+    assert lens == DoubleSphere(80, 60, 50, 60, 41, 29, -0.2, 0.6)
+    assert camera('model = "unified_omni"\nalpha = 0.6\nbeta = 1.1') == UnifiedOmni(*frame, 0.6, 1.1)
+    assert camera('model = "unified_omni"\nxi = 1.5') == UnifiedOmni.mei(*frame, 1.5)
 
 
 def test_mesh_file_is_shown_from_outside(tmp_path):
@@ -301,6 +318,14 @@ MISTAKES = [
     (
         RADIAL + "eye = [1, 1, 1]\ncamera_from_world = [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]",
         r"5: camera\.eye = .*not eye",
+    ),
+    (CAMERA + 'model = "kannala_brandt"', "3: camera.focal: this key is missing: give a list of 2"),
+    (CAMERA + 'model = "kannala_brandt"\nfocal = [9, 9]\nk = [1]', r"6: camera\.k = \[1\]: give a list of 4"),
+    (CAMERA + 'model = "double_sphere"\nfocal = [9, 9]\nxi = -1', r"6: camera\.xi = -1: give a number above -1"),
+    (CAMERA + 'model = "unified_omni"\nfocal = [9, 9]', "3: camera: give either alpha .* or xi"),
+    (
+        CAMERA + 'model = "unified_omni"\nfocal = [9, 9]\nxi = 1\nbeta = 2',
+        r"7: camera\.beta = 2: give alpha with it, not xi",
     ),
     (CAMERA + 'model = "pinhole"\nfov = 40\nfocal = [1, 1]', r"5: camera\.fov = 40: give fov or focal, not both"),
     (CAMERA + 'model = "pinhole"\ncenter = [1, 1]', r"5: camera\.center = \[1, 1\]: give camera\.focal too"),

@@ -141,6 +141,19 @@ def test_stats_count_tests_and_fragments():
     assert hits.stats.overdraw == hits.stats.tests / hits.stats.rendered
 
 
+def test_bounds_change_the_work_and_not_the_frame():
+    scene = mp.builtin_scene("facade", 200, 200)
+    for name in ("paraboloid", "cosine_sphere", "equisolid", "equidistant"):
+        camera = mp.Radial(200, 200, name, scene.camera.camera_from_world)
+        tight, quad = (mp.rasterize(camera, scene, bound=bound) for bound in ("tight", "quad"))
+        assert np.array_equal(tight.triangle, quad.triangle)
+        assert np.array_equal(tight.depth, quad.depth)
+        assert quad.stats.rendered == tight.stats.rendered
+        assert quad.stats.tests > 1.5 * tight.stats.tests
+    with pytest.raises(mp.InputError, match="bound='quad' is for radial projections, not for a Pinhole"):
+        mp.rasterize(mp.Pinhole(8, 8), scene, bound="quad")
+
+
 def test_large_and_small_triangles_meet():
     """Triangles that one lane walks, and those that are cut into blocks, in one scene, image not a multiple of 8."""
     mesh = mp.Mesh.concatenate(
@@ -243,7 +256,7 @@ def test_one_pixel(method):
     ("call", "words"),
     [
         (lambda c, m: mp.rasterize(c, m, method="magic"), "allowed are invert, vertex"),
-        (lambda c, m: mp.rasterize(c, m, bound="loose"), "allowed are tight"),
+        (lambda c, m: mp.rasterize(c, m, bound="loose"), "allowed are tight, quad"),
         (lambda c, m: mp.rasterize(c, m, level=2), "no setting 'level': allowed are bound"),
         (lambda c, m: mp.rasterize(c, m, method="raytrace", level=2), "allowed are none"),
         (lambda c, m: mp.rasterize(c, m, method="vertex", level=1.5), "whole number from 0 to 7"),

@@ -43,11 +43,21 @@ class Pipeline:
     replays the length of the recording.
 
     box(camera, a, b, c) gives (low, high, valid) in pixels. test: module with setup, hit, may_hit, weights, pack and
-    unpack. With count=True each frame also counts tests and covered samples.
+    unpack. With count=True each frame also counts tests and covered samples. With exclude=False no block is dropped
+    because of an edge, and all pixels of a box are tested.
     """
 
-    def __init__(self, types: Any, box: Callable[..., Any], test: Any, width: int, height: int, count: bool = False):
-        self.types, self.box, self.test, self.count = types, box, test, count
+    def __init__(
+        self,
+        types: Any,
+        box: Callable[..., Any],
+        test: Any,
+        width: int,
+        height: int,
+        count: bool = False,
+        exclude: bool = True,
+    ):
+        self.types, self.box, self.test, self.count, self.exclude = types, box, test, count, exclude
         self.width, self.height = width, height
         self.block_columns, self.block_rows = blocks(width, height)
         self.places = self.block_columns * self.block_rows * BLOCK * BLOCK
@@ -173,7 +183,7 @@ class Pipeline:
             block = types.UInt(row * self.block_columns + column)
             spread = dr.gather(types.Float, samples.spreads, block)
             centre = dr.gather(type(samples.centres), samples.centres, block)
-            keep = (spread >= 0) & self.test.may_hit(shape, centre, spread)
+            keep = (spread >= 0) & (self.test.may_hit(shape, centre, spread) if self.exclude else True)
             slot: Any = dr.scatter_inc(found, types.UInt(0), keep)
             fits = keep & (slot < PAIRS)
             rank = dr.scatter_inc(counts, block, fits)

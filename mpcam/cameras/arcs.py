@@ -1,13 +1,14 @@
 """Boxes of curved triangles under radial projections.
 
 An edge of a scene triangle lies in a plane through the centre, so it is a great-circle arc of directions, whose image
-turns one way only (FORMULAS 7: nu(s) increases). So along each image axis an arc has at most one extremum per half
-turn, and it lies where the slope along the arc changes its sign; between two points with tangents, the arc stays
-inside the triangle of the two points and the crossing of the tangents. Corners of the box are also reached on the rim,
-where a rim point on an image axis lies inside the triangle.
+turns one way only (for profiles with `Profile.convex`; the page on rasterization says why). So along each image axis
+an arc has at most one extremum per half turn, and it lies where the slope along the arc changes its sign; between two
+points with tangents, the arc stays inside the triangle of the two points and the crossing of the tangents. Corners of
+the box are also reached on the rim, where a rim point on an image axis lies inside the triangle.
 """
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from mpcam.cameras.profiles import Profile
 from mpcam.cameras.types import Box
@@ -56,6 +57,9 @@ class RadialCamera(Protocol):
     def pixels_per_radius(self) -> Array: ...
 
 
+EdgeBox = Callable[["RadialCamera", Vector, Vector], Box]
+
+
 def image_and_slopes(camera: RadialCamera, p: Vector, *velocities: Vector) -> tuple[Vector, list[Vector], Array]:
     """Pixel of a direction p (any length), pixel velocities for given velocities of p, and the angle from the axis.
 
@@ -83,15 +87,19 @@ def image_and_slopes(camera: RadialCamera, p: Vector, *velocities: Vector) -> tu
     return pixel, slopes, theta
 
 
-def tangent_limit(m0: Vector, g0: Vector, m1: Vector, g1: Vector, i: int, span: Array) -> Array:
-    """Coordinate i of the crossing of the tangents at two points of an arc, and at least what the first tangent allows.
+def tangent_limit(m0: Vector, g0: Vector, m1: Vector, g1: Vector, i: int, span: Array, far: Array) -> Array:
+    """Coordinate i that an arc between two points cannot pass, by the crossing of the tangents there.
 
-    m0, m1: points; g0, g1: velocities; span: length of the parameter interval, the fallback for near-parallel tangents.
+    m0, m1: points; g0, g1: velocities, opposite along i; span: length of the parameter interval. Where the tangents
+    are parallel to rounding, the arc is straight and its first velocity over the span limits it; where they oppose
+    each other so that they do not cross, nothing is known but that it stays within `far`.
     """
     turn = g0[0] * g1[1] - g0[1] * g1[0]
+    agreement = g0[0] * g1[0] + g0[1] * g1[1]
+    parallel = abs(turn) <= 1e3 * epsilon(turn) * abs(agreement)
     reach = ((m1[0] - m0[0]) * g1[1] - (m1[1] - m0[1]) * g1[0]) / where(turn != 0, turn, 1.0)
-    usable = (turn != 0) & (reach >= 0) & (reach < 4 * span)
-    return m0[i] + g0[i] * where(usable, reach, span)
+    crossing = where((turn != 0) & (reach >= 0), m0[i] + g0[i] * reach, where(g0[i] > 0, far, -far))
+    return where(parallel & (agreement > 0), m0[i] + g0[i] * span, crossing)
 
 
 def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
@@ -99,7 +107,7 @@ def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
     along = dot(a, b)
     tangent = normalize(vector(*(b[i] - a[i] * along for i in range(3))))
     length = atan2(norm(cross(a, b)), along)
-    start, span, valid, twice = _visible_part(camera, a, tangent, length)
+    start, span, valid, twice = visible_part(camera, a, tangent, length)
 
     def at(s: Array) -> tuple[Vector, Vector]:
         c, d = cos(s), sin(s)
@@ -131,7 +139,7 @@ def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
             rising = sign * at(middle)[1][i] > 0
             left, right = where(rising, middle, left), where(rising, right, middle)
         (m0, g0), (m1, g1) = at(left), at(right)
-        limit = tangent_limit(m0, g0, m1, g1, i, right - left)
+        limit = tangent_limit(m0, g0, m1, g1, i, right - left, _FAR)
         if sign > 0:
             high[i] = maximum(high[i], where(found, limit, high[i]))
         else:
@@ -161,7 +169,7 @@ def _through_antipode(camera: RadialCamera, height: Array) -> Array:
     return (height <= near - 1) & (0.5 * camera.fov + 0.0 * height >= PI - 2 * near**0.5)
 
 
-def _visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array) -> tuple[Array, Array, Array, Array]:
+def visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array) -> tuple[Array, Array, Array, Array]:
     """Part of an arc within the field of view: start, span, whether there is any, whether there are two parts.
 
     The arc is a cos s + tangent sin s, s in [0, length]; its height over the camera plane is R cos(s - crest).
@@ -201,8 +209,8 @@ def _disc(camera: RadialCamera, box: Box, whole: Array) -> Box:
     return Box(low, high, box.valid | whole)
 
 
-def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
-    """Box of a triangle (camera frame): union of its arcs' boxes and of the rim points that lie inside it."""
+def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box: EdgeBox = arc_box) -> Box:
+    """Box of a triangle (camera frame): union of its edges' boxes and of the rim points that lie inside it."""
     corners, finite = _clean(a, b, c)
     if not camera.profile.convex:
         box = sector_bound(camera, corners)
@@ -210,7 +218,7 @@ def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
     low, high, valid = [_FAR, _FAR], [-_FAR, -_FAR], ~finite & finite
     through_eye = valid
     for p, q in ((0, 1), (1, 2), (2, 0)):
-        arc = arc_box(camera, corners[p], corners[q])
+        arc = edge_box(camera, corners[p], corners[q])
         for i in (0, 1):
             low[i] = minimum(low[i], where(arc.valid, arc.low[i], _FAR))
             high[i] = maximum(high[i], where(arc.valid, arc.high[i], -_FAR))
@@ -246,7 +254,7 @@ def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) ->
         return Box(sector.low, sector.high, sector.valid & finite)
     images, tangents, inside = [], [], finite
     # An edge of at most 45 degrees between corners nearer than 153 degrees keeps away from the point behind the eye.
-    furthest = min(0.95 * camera.profile.limit, 0.85 * PI)
+    furthest = minimum(0.95 * camera.profile.limit, 0.85 * PI)
     for k in range(3):
         after, before = corners[(k + 1) % 3], corners[(k + 2) % 3]
         forward = vector(*(after[i] - corners[k][i] for i in range(3)))
@@ -263,7 +271,7 @@ def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) ->
         squares = (g0[0] * g0[0] + g0[1] * g0[1]) * (g1[0] * g1[0] + g1[1] * g1[1])
         inside = inside & ((squares == 0) | ((agreement > 0) & (agreement * agreement > 0.75 * squares)))
         for i in (0, 1):
-            limit = tangent_limit(m0, g0, m1, g1, i, 1.0)
+            limit = tangent_limit(m0, g0, m1, g1, i, 1.0, _FAR)
             high[i] = maximum(high[i], where((g0[i] > 0) & (g1[i] < 0), limit, high[i]))
             low[i] = minimum(low[i], where((g0[i] < 0) & (g1[i] > 0), limit, low[i]))
     box = Box(
@@ -274,41 +282,91 @@ def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) ->
     return _padded(camera, box)
 
 
-def sector_bound(camera: RadialCamera, corners: list[Vector]) -> Box:
-    """Box of the annular sector that holds the triangle's bounding cone; for any increasing profile.
+class Cone(NamedTuple):
+    """Bounding cone of a triangle's directions, in angles from the optical axis and azimuths around it.
 
-    corners: unit directions. The cone's axis is the mean direction; a cone of 90 degrees or more gives the whole disc.
+    It holds the angles theta - spread to theta + spread, and azimuths up to half_turn away from `azimuth`. around:
+    whether it holds a direction of the optical axis, and so every azimuth. wide: whether it may hold any direction.
     """
+
+    theta: Array
+    spread: Array
+    azimuth: Array
+    half_turn: Array
+    around: Array
+    wide: Array
+
+
+def bounding_cone(corners: list[Vector]) -> Cone:
+    """Cone around the mean of three unit directions; `wide` from 90 degrees, and where a corner is at the centre."""
     axis = normalize(vector(*(corners[0][i] + corners[1][i] + corners[2][i] for i in range(3))))
     cosine = minimum(minimum(dot(axis, corners[0]), dot(axis, corners[1])), dot(axis, corners[2]))
     wide = (cosine < 0.01) | (dot(corners[0], corners[0]) < 0.5)
     wide = wide | (dot(corners[1], corners[1]) < 0.5) | (dot(corners[2], corners[2]) < 0.5)
-    cosine = minimum(cosine, 1.0)
-    sine = sqrt(maximum(1.0 - cosine * cosine, 0.0)) + 4 * sqrt(epsilon(cosine)) * 0.0
-    spread = maximum(atan2(sine, cosine), 2e-4 if epsilon(cosine) > 1e-10 else 1e-8)
-    sideways = sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    theta = atan2(sideways, axis[2])
-    half_fov = 0.5 * camera.fov
-    valid = wide | (theta - spread <= half_fov)
-    inner, outer = maximum(theta - spread, 0.0), minimum(theta + spread, half_fov)
+    # From the chords, since the cosine of a small angle has lost it: in float32, all below 3e-4 look alike.
+    chords = [vector(*(corner[i] - axis[i] for i in range(3))) for corner in corners]
+    longest = maximum(maximum(dot(chords[0], chords[0]), dot(chords[1], chords[1])), dot(chords[2], chords[2]))
+    spread = 2.0 * asin(minimum(0.5 * sqrt(longest), 1.0)) + 8 * epsilon(cosine)
+    theta = atan2(sqrt(axis[0] * axis[0] + axis[1] * axis[1]), axis[2])
     around = (theta <= spread) | (theta + spread >= PI)
     opening = where(around, 0.0, sin(spread) / where(around, 1.0, maximum(sin(theta), 1e-30)))
     half_turn = where(around, PI, asin(minimum(opening, 1.0)) + 1e-6)
+    return Cone(theta, spread, atan2(axis[1], axis[0]), half_turn, around, wide)
+
+
+def _nearest(cone: Cone) -> list[tuple[Array, Array]]:
+    """For u and v: cosines of the angles from the positive and from the negative image axis to the cone's azimuths."""
+    cosines = []
+    for i in (0, 1):
+        towards = []
+        for target in (i * 0.5 * PI, i * 0.5 * PI + PI):
+            away = absolute(_wrapped(cone.azimuth - target))
+            towards.append(cos(maximum(away - cone.half_turn, 0.0)))
+        cosines.append((towards[0], towards[1]))
+    return cosines
+
+
+def sector_bound(camera: RadialCamera, corners: list[Vector]) -> Box:
+    """Box of the annular sector that holds the triangle's bounding cone; for any increasing profile.
+
+    corners: unit directions. A cone of 90 degrees or more gives the whole disc.
+    """
+    cone = bounding_cone(corners)
+    half_fov = 0.5 * camera.fov
+    valid = cone.wide | (cone.theta - cone.spread <= half_fov)
+    outer = minimum(cone.theta + cone.spread, half_fov)
+    inner = where(cone.around, 0.0, minimum(maximum(cone.theta - cone.spread, 0.0), half_fov))
     scale = camera.pixels_per_radius
-    inner = where(around, 0.0, minimum(inner, half_fov))
     r0, r1 = scale * camera.profile.radius(inner), scale * camera.profile.radius(outer)
-    azimuth = atan2(axis[1], axis[0])
     low, high = [], []
-    for i, centre in enumerate((camera.cx, camera.cy)):
-        limits = []
-        for target in (i * 0.5 * PI, i * 0.5 * PI + PI):  # azimuths of the positive and the negative image axis
-            away = absolute(_wrapped(azimuth - target))
-            nearest = maximum(away - half_turn, 0.0)  # angle from that image axis to the sector
-            cosine = cos(nearest)
-            limits.append(where(cosine >= 0, r1, r0) * cosine)
-        high.append(centre + limits[0])
-        low.append(centre - limits[1])
-    return _disc(camera, _padded(camera, Box(vector(*low), vector(*high), valid)), wide)
+    for centre, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
+        high.append(centre + where(ahead >= 0, r1, r0) * ahead)
+        low.append(centre - where(behind >= 0, r1, r0) * behind)
+    return _disc(camera, _padded(camera, Box(vector(*low), vector(*high), valid)), cone.wide)
+
+
+def outer_bound(camera: RadialCamera, limit: Array, a: Vector, b: Vector, c: Vector) -> Box:
+    """Box of the part of a triangle between the rim of the view and a larger angle, out to infinity.
+
+    limit: radians. It takes no profile beyond the rim, and stands for images that reach very far out, whose rounding
+    errors are large. Not valid where there is no such part.
+    """
+    corners, finite = _clean(a, b, c)
+    cone = bounding_cone(corners)
+    half_fov = 0.5 * camera.fov
+    reached = cone.wide | ((cone.theta + cone.spread >= half_fov) & (cone.theta - cone.spread <= limit))
+    # A view of less than 180 degrees is convex: it holds a triangle when it holds the corners.
+    lowest = minimum(minimum(corners[0][2], corners[1][2]), corners[2][2])
+    nearest = minimum(minimum(dot(corners[0], corners[0]), dot(corners[1], corners[1])), dot(corners[2], corners[2]))
+    within = (nearest > 0.5) & (half_fov < 0.5 * PI) & (lowest > cos(half_fov + 0.0 * lowest) + 8 * epsilon(lowest))
+    reached = reached & ~within
+    inner = where(cone.around, 0.0, minimum(maximum(cone.theta - cone.spread, 0.0), half_fov))
+    r0 = camera.pixels_per_radius * camera.profile.radius(inner)
+    low, high = [], []
+    for centre, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
+        high.append(where(cone.wide | (ahead > -1e-6), _FAR, centre + r0 * ahead))
+        low.append(where(cone.wide | (behind > -1e-6), -_FAR, centre - r0 * behind))
+    return _padded(camera, Box(vector(*low), vector(*high), finite & reached & (limit > half_fov)))
 
 
 def _wrapped(angle: Array) -> Array:

@@ -54,6 +54,11 @@ def _last(components: Vector) -> Array:
     return np.moveaxis(components, 0, -1)
 
 
+def given_fields(camera: Any) -> list[str]:
+    """Names of the fields of a model that its constructor takes; others are derived from them."""
+    return [field.name for field in dataclasses.fields(camera) if field.init]
+
+
 class Camera:
     """Base of the camera models: width, height (pixels) and camera_from_world (4x4, rigid)."""
 
@@ -162,8 +167,7 @@ class Camera:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        names = [field.name for field in dataclasses.fields(self)]  # pyright: ignore[reportArgumentType]
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in given_fields(self))
 
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
@@ -210,7 +214,7 @@ def register_pytrees() -> None:
 
 
 def _register(model: type, tree_util: Any) -> None:
-    names = [field.name for field in dataclasses.fields(model)]
+    names = given_fields(model)
     data = [name for name in names if name not in model.static_fields]
     static = [name for name in names if name in model.static_fields]
 

@@ -36,7 +36,7 @@ class Profile:
 
     radius, slope: r and dr/dtheta of theta (radians). angle: theta of r. limit: the profile is defined and increasing
     on [0, limit) or [0, limit], radians. convex: whether 1/f is a convex, increasing-from-tangent function of
-    cot(theta), which makes the images of straight lines bulge away from the centre (DESIGN: "general criterion"), so
+    cot(theta), which makes the images of straight lines bulge away from the centre, so
     that tangents bound them; bounds fall back to annular sectors where it is False.
     """
 
@@ -140,10 +140,10 @@ def custom_profile(
             raise InputError(f"profile {name!r}: slope is off the derivative of radius by {error:.2g}; mend or omit it")
     if angle is not None and float(np.abs(np.asarray(angle(r)) - theta).max()) > 1e-6:
         raise InputError(f"profile {name!r}: angle(radius(theta)) is not theta; mend or omit it")
-    return Profile(name, radius, chosen_slope, chosen_angle, float(max_angle), True, _bulges_outward(theta, r))
+    return Profile(name, radius, chosen_slope, chosen_angle, float(max_angle), True, bulges_outward(theta, r))
 
 
-def _bulges_outward(theta: np.ndarray, r: np.ndarray) -> bool:
+def bulges_outward(theta: np.ndarray, r: np.ndarray) -> bool:
     """Whether U(w) = 1 / f, w = cot(theta), has U'' >= 0 and U - w U' >= 0 on samples.
 
     The sample angles avoid the ends, where w or U is infinite; divided differences tolerate rounding of 1e-9.

@@ -7,25 +7,11 @@ from typing import Any, ClassVar, Self
 from mpcam.cameras.arcs import radial_bound, radial_bound_quick
 from mpcam.cameras.base import Camera
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
+from mpcam.cameras.quads import radial_bound_quads
+from mpcam.cameras.symmetric import finite_pixel, finite_point, symmetric_image, symmetric_ray
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
-from mpcam.math import (
-    PI,
-    Array,
-    Vector,
-    atan2,
-    cos,
-    epsilon,
-    isfinite,
-    library,
-    maximum,
-    minimum,
-    norm,
-    sin,
-    sqrt,
-    vector,
-    where,
-)
+from mpcam.math import PI, Array, Vector, epsilon, library, vector, where
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -131,60 +117,32 @@ class Radial(Camera):
 
     def local_ray(self, pixel: Vector) -> Ray:
         """Ray of a pixel in the camera frame; valid up to the rim."""
-        u, v = pixel
-        valid = isfinite(u) & isfinite(v)
-        x, y = where(valid, u, 0.0) - self.cx, where(valid, v, 0.0) - self.cy
-        squared = x * x + y * y
-        distance = sqrt(where(squared > 0, squared, 1.0))
-        rim = self.radius * (1.0 + 4.0 * epsilon(distance))
-        valid = valid & (squared <= rim * rim)
-        off_axis = valid & (squared > 0)
-        distance = where(off_axis, distance, 1.0)  # 1 stands for pixels that do not matter
-        theta = self.profile.angle(where(off_axis, distance, 0.0) / self.pixels_per_radius)
-        sideways = where(off_axis, sin(theta) / distance, 0.0)
-        zero = 0.0 * x
-        inside = where(valid, 1.0, 0.0)
-        direction = vector(x * sideways * inside, y * sideways * inside, where(valid, cos(theta), 1.0))
-        # At the centre the slope of the direction in the pixel is 1 / (pixels per radian).
-        centre = 1.0 / (self.pixels_per_radius * self.profile.slope(zero))
-        direction = vector(
-            where(off_axis, direction[0], x * centre * inside),
-            where(off_axis, direction[1], y * centre * inside),
-            direction[2],
-        )
-        return Ray(vector(zero, zero, zero), direction, valid)
+        scale = self.pixels_per_radius
+        u, v, valid = finite_pixel(pixel)
+        return symmetric_ray(self.profile, (u - self.cx) / scale, (v - self.cy) / scale, self.radius / scale, valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
         """Image of a point in the camera frame; valid up to the rim, not at the camera's centre."""
-        x, y, z = point
-        finite = isfinite(x) & isfinite(y) & isfinite(z)
-        x, y, z = where(finite, x, 0.0), where(finite, y, 0.0), where(finite, z, 0.0)
-        depth = norm(vector(x, y, z))
-        image, inside = self.local_image(vector(x, y, z))
-        valid = finite & (depth > 0) & inside
+        point, depth, valid = finite_point(point)
+        image, inside = self.local_image(point)
+        valid = valid & inside
         pixel = vector(where(valid, image[0], self.cx), where(valid, image[1], self.cy))
         return (Projection(pixel, depth, valid),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, also beyond the rim as far as f goes on, and whether it lies within the field of view."""
-        x, y, z = point
-        largest = maximum(maximum(abs(x), abs(y)), abs(z))
-        scale = 1.0 / where(largest > 0, largest, 1.0)
-        x, y, z = x * scale, y * scale, z * scale
-        squared = x * x + y * y
-        off_axis = squared > 0
-        rho = sqrt(where(off_axis, squared, 1.0))
-        theta = atan2(where(off_axis, rho, 0.0), z)
-        reach = minimum(theta, self.profile.reach)
-        ahead = where(z > 0, z, 1.0)
-        ratio = where(off_axis, self.profile.radius(reach) / rho, self.profile.slope(0.0 * rho) / ahead)
-        ratio = ratio * self.pixels_per_radius
+        x, y, theta = symmetric_image(self.profile, point)
+        scale = self.pixels_per_radius
         inside = theta <= 0.5 * self.fov + 4 * PI * epsilon(theta)
-        return vector(self.cx + ratio * x, self.cy + ratio * y), inside
+        return vector(self.cx + scale * x, self.cy + scale * y), inside
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
         """Box of the curved triangle, exact to about 0.01 pixel (annular sectors for profiles that are not convex)."""
         return radial_bound(self, a, b, c)
+
+    def local_bound_quads(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """Box of the quads around the curved edges: the paper's looser bound, for comparison."""
+        return radial_bound_quads(self, a, b, c)
 
     def local_bound_quick(self, a: Vector, b: Vector, c: Vector) -> Box:
         """A cheaper conservative box, as tight for small triangles."""

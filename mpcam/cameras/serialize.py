@@ -1,21 +1,25 @@
 """Cameras as plain dictionaries and JSON, for image headers and scene files; a round trip gives an equal camera."""
 
-import dataclasses
 import json
 from typing import Any
 
 import numpy as np
 
-from mpcam.cameras.base import Camera
+from mpcam.cameras.base import Camera, given_fields
+from mpcam.cameras.double_sphere import DoubleSphere
+from mpcam.cameras.kannala_brandt import KannalaBrandt
 from mpcam.cameras.orthographic import Orthographic
 from mpcam.cameras.pinhole import Pinhole
 from mpcam.cameras.profiles import PROFILES, Profile
 from mpcam.cameras.radial import Radial
+from mpcam.cameras.unified_omni import UnifiedOmni
 from mpcam.errors import InputError
 
 SCHEMA = 1
 
-MODELS: dict[str, type[Camera]] = {model.__name__: model for model in (Pinhole, Orthographic, Radial)}
+MODELS: dict[str, type[Camera]] = {
+    model.__name__: model for model in (Pinhole, Orthographic, Radial, KannalaBrandt, DoubleSphere, UnifiedOmni)
+}
 
 
 def camera_to_dict(camera: Camera) -> dict[str, Any]:
@@ -24,8 +28,8 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
     Raises InputError for a camera whose profile is a user's own function, which no file can hold.
     """
     result: dict[str, Any] = {"schema": SCHEMA, "model": type(camera).__name__}
-    for field in dataclasses.fields(camera):  # pyright: ignore[reportArgumentType]
-        value = getattr(camera, field.name)
+    for name in given_fields(camera):
+        value = getattr(camera, name)
         if isinstance(value, Profile):
             if PROFILES.get(value.name) is not value:
                 raise InputError(
@@ -35,7 +39,9 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
             value = value.name
         elif hasattr(value, "shape"):
             value = np.asarray(value, np.float64).tolist()
-        result[field.name] = value
+        elif isinstance(value, tuple):
+            value = [float(number) for number in value]
+        result[name] = value
     return result
 
 
@@ -48,7 +54,7 @@ def camera_from_dict(data: dict[str, Any]) -> Camera:
     if not isinstance(name, str) or name not in MODELS:
         raise InputError(f"camera model {name!r} is unknown: allowed are {', '.join(MODELS)}")
     model = MODELS[name]
-    known = {field.name for field in dataclasses.fields(model)}  # pyright: ignore[reportArgumentType]
+    known = set(given_fields(model))
     unknown = sorted(set(fields) - known)
     if unknown:
         raise InputError(f"camera model {name} has no field {unknown[0]!r}: allowed are {', '.join(sorted(known))}")

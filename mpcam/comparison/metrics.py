@@ -1,7 +1,7 @@
 """How far one rendering is from the truth: first hits, projection and images.
 
-A `Hits` here is any object with the arrays of `mpcam.render.rasterize`: `.triangle` (H, W) int with -1 for none,
-`.depth` (H, W) with inf for none, `.barycentric` (H, W, 2) weights of corners 1 and 2. Everything is float64 NumPy.
+A `Hits` here is any object with the arrays of `mpcam.rasterize`: `.triangle` (H, W) int with -1 for none, `.depth`
+(H, W) with inf for none, `.barycentric` (H, W, 2) weights of the second and third corner. Everything is float64 NumPy.
 
 Image errors take linear RGB (H, W, 3) and compare in display space: clipped to [0, 1] and sRGB-encoded, so peak = 1.
 """

@@ -101,6 +101,7 @@ class Row:
 
     @property
     def label(self) -> str:
+        """Method and setting, as tables and plots show them."""
         return f"{self.method} {self.setting}".strip()
 
 
@@ -179,6 +180,7 @@ class Comparison:
         }
 
     def to_json(self) -> str:
+        """`to_dict` as JSON text."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
     def write(self, output: str | Path) -> Path:

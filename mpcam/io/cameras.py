@@ -10,9 +10,11 @@ if TYPE_CHECKING:
 
 
 def load_camera(path_or_name: str | Path) -> "Camera":
-    """The camera in a .json file (see `camera_to_json`) or the header of an .exr that mpcam wrote, else of a scene.
+    """The camera in a .json file (see `camera_to_json`), a calibration, the header of an .exr, or else of a scene.
 
-    Scenes are what `load_scene` reads. Raises InputError for files that are missing, unreadable or without a camera.
+    Calibrations are .yaml, .yml, .txt and transforms.json files that `read_calibration` reads, with one camera. Scenes
+    are what `load_scene` reads. Raises InputError for files that are missing, unreadable or without a camera, and for
+    calibrations of several cameras.
     """
     from mpcam.cameras.serialize import camera_from_json
     from mpcam.io.images import read_camera
@@ -24,6 +26,8 @@ def load_camera(path_or_name: str | Path) -> "Camera":
         if camera is None:
             raise InputError(f"{path_or_name}: has no camera in its header: give an EXR that mpcam wrote with one")
         return camera
+    if kind in (".yaml", ".yml", ".txt") or Path(path_or_name).name == "transforms.json":
+        return _only(path_or_name)
     if kind != ".json":
         return load_scene(path_or_name).scene.camera
     try:
@@ -34,3 +38,15 @@ def load_camera(path_or_name: str | Path) -> "Camera":
         raise InputError(f"{path_or_name}: is not text: give a camera that camera_to_json wrote") from None
     except InputError as error:
         raise InputError(f"{path_or_name}: {error}") from None
+
+
+def _only(path: str | Path) -> "Camera":
+    """The only camera of a calibration."""
+    from mpcam.io.calibration import read_calibration
+
+    cameras = read_calibration(path)
+    if len(cameras) > 1:
+        names = ", ".join(cameras)
+        names = names if len(names) < 60 else f"{names[:57]}..."
+        raise InputError(f"{path}: has {len(cameras)} cameras ({names}): one is needed; pick it with read_calibration")
+    return next(iter(cameras.values()))

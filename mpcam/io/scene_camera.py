@@ -5,14 +5,25 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras import Orthographic, Pinhole, Radial, look_at
+from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni, look_at
 from mpcam.cameras.profiles import PROFILES
 from mpcam.errors import InputError
-from mpcam.io.scene_tables import CameraTable, OrthographicTable, PinholeTable, RadialTable
+from mpcam.io.scene_tables import (
+    CameraTable,
+    DoubleSphereTable,
+    KannalaBrandtTable,
+    LensTable,
+    OrthographicTable,
+    PinholeTable,
+    RadialTable,
+    UnifiedOmniTable,
+)
 from mpcam.io.scene_text import SceneText
 
 # Half the angle that the meshes may take up: near enough for a fisheye to show its curvature, and outside of them.
 _WIDEST = math.radians(65)
+
+Frame = tuple[int, int, float, float, float, float]  # width, height, fx, fy, cx, cy
 
 
 def default_camera(bounds: np.ndarray, up: str = "z", size: tuple[int, int] = (512, 512)) -> Radial:
@@ -41,6 +52,8 @@ def build_camera(table: CameraTable, bounds: np.ndarray, text: SceneText) -> Any
         if isinstance(table, OrthographicTable):
             scale = table.scale or _fitting_scale(bounds, table.size)
             return Orthographic(width, height, scale=scale, camera_from_world=_pose(table, bounds, 0.0, text))
+        if isinstance(table, LensTable):
+            return _lens(table, bounds, text)
         raise NotImplementedError(f"no camera for {type(table).__name__}")
 
 
@@ -58,6 +71,34 @@ def _pinhole(table: PinholeTable, bounds: np.ndarray, text: SceneText) -> Pinhol
     cx, cy = table.center or (0.5 * width, 0.5 * height)
     narrowest = 2 * math.atan(min(0.5 * width / fx, 0.5 * height / fy))
     return Pinhole(width, height, fx, fy, cx, cy, _pose(table, bounds, narrowest, text))
+
+
+def _lens(table: LensTable, bounds: np.ndarray, text: SceneText) -> Any:
+    width, height = table.size
+    center = table.center or (0.5 * width, 0.5 * height)
+    frame: Frame = (width, height, *table.focal, *center)
+    rest: dict[str, Any] = {"max_angle": math.radians(0.5 * table.fov)}
+    if isinstance(table, KannalaBrandtTable):
+        camera = KannalaBrandt(*frame, table.k, **rest)
+    elif isinstance(table, DoubleSphereTable):
+        camera = DoubleSphere(*frame, table.xi, table.alpha, **rest)
+    elif isinstance(table, UnifiedOmniTable):
+        camera = _unified(table, frame, rest, text)
+    else:
+        raise NotImplementedError(f"no camera for {type(table).__name__}")
+    nearest = [min(c, size - c) / f for c, size, f in zip(center, table.size, table.focal, strict=True)]
+    narrowest = 2 * float(camera.angle_at(max(min(nearest), 0.0)))
+    return camera.with_pose(_pose(table, bounds, narrowest, text))
+
+
+def _unified(table: UnifiedOmniTable, frame: Frame, rest: dict[str, Any], text: SceneText) -> UnifiedOmni:
+    if (table.alpha is None) == (table.xi is None):
+        raise text.error(("camera",), "give either alpha (and beta) or xi")
+    if table.xi is None:
+        return UnifiedOmni(*frame, table.alpha, 1.0 if table.beta is None else table.beta, **rest)
+    if table.beta is not None:
+        raise text.error(("camera", "beta"), "give alpha with it, not xi")
+    return UnifiedOmni.mei(*frame, table.xi, **rest)
 
 
 def _check_field_of_view(table: RadialTable, text: SceneText) -> None:

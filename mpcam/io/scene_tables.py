@@ -71,6 +71,38 @@ class OrthographicTable(CameraTable, tag="orthographic", frozen=True):
     scale: Positive | None = None
 
 
+class LensTable(CameraTable, frozen=True, kw_only=True):
+    """Keys of the calibrated lens models, in pixels; the centre of the top left pixel is at (0.5, 0.5).
+
+    fov: twice the largest angle between a ray and the axis; the model's own limit holds too.
+    """
+
+    focal: tuple[Positive, Positive]
+    center: tuple[float, float] | None = None  # default: the middle of the image
+    fov: Annotated[float, Meta(gt=0, le=360)] = 360.0
+
+
+class KannalaBrandtTable(LensTable, tag="kannala_brandt", frozen=True, kw_only=True):
+    """model = "kannala_brandt": r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
+
+    k: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+class DoubleSphereTable(LensTable, tag="double_sphere", frozen=True, kw_only=True):
+    """model = "double_sphere": Usenko's model."""
+
+    xi: Annotated[float, Meta(gt=-1)]
+    alpha: Annotated[float, Meta(ge=0, le=1)]
+
+
+class UnifiedOmniTable(LensTable, tag="unified_omni", frozen=True, kw_only=True):
+    """model = "unified_omni": alpha and beta of the enhanced unified model, or xi of Mei's."""
+
+    alpha: Annotated[float, Meta(ge=0, le=1)] | None = None
+    beta: Positive | None = None  # default: 1
+    xi: Annotated[float, Meta(ge=0)] | None = None
+
+
 class DirectionalTable(Table, tag_field="type", tag="directional", frozen=True):
     """[[light]] type = "directional": direction is the way that the light travels."""
 
@@ -111,7 +143,15 @@ class SceneTable(Table, frozen=True):
     """The whole file. Without `light`, one directional light comes from behind the camera; `light = []` means none."""
 
     mesh: list[MeshTable]
-    camera: RadialTable | PinholeTable | OrthographicTable | None = None
+    camera: (
+        RadialTable
+        | PinholeTable
+        | OrthographicTable
+        | KannalaBrandtTable
+        | DoubleSphereTable
+        | UnifiedOmniTable
+        | None
+    ) = None
     light: list[DirectionalTable | PointTable] | None = None
     ambient: Color = 0.15
     background: Color = 0.0

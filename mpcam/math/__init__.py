@@ -15,12 +15,15 @@ from mpcam.math.arrays import library as library
 from mpcam.math.arrays import maximum as maximum
 from mpcam.math.arrays import minimum as minimum
 from mpcam.math.arrays import safe_divide as safe_divide
+from mpcam.math.arrays import safe_sqrt as safe_sqrt
 from mpcam.math.arrays import sin as sin
 from mpcam.math.arrays import sqrt as sqrt
 from mpcam.math.arrays import tan as tan
 from mpcam.math.arrays import where as where
 from mpcam.math.roots import central_slope as central_slope
 from mpcam.math.roots import invert_increasing as invert_increasing
+from mpcam.math.roots import polynomial as polynomial
+from mpcam.math.roots import sign_changes as sign_changes
 from mpcam.math.vectors import Vector as Vector
 from mpcam.math.vectors import cross as cross
 from mpcam.math.vectors import dot as dot

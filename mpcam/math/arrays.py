@@ -96,7 +96,9 @@ def isfinite(x: Array) -> Array:
 
 
 def where(condition: Array, x: Array, y: Array) -> Array:
-    """x where the condition holds, else y."""
+    """x where the condition holds, else y; Python numbers stay Python numbers."""
+    if isinstance(condition, (bool, np.bool_)) and type(x) in (float, int) and type(y) in (float, int):
+        return x if condition else y
     functions = _functions(condition, x, y)
     return functions.select(condition, x, y) if functions.__name__ == "drjit" else functions.where(condition, x, y)
 
@@ -123,3 +125,9 @@ def safe_divide(x: Array, y: Array, otherwise: Array = 0.0) -> Array:
     """x / y, and `otherwise` where y is zero; the guard stands on both sides, so gradients stay finite too."""
     nonzero = y != 0
     return where(nonzero, x / where(nonzero, y, 1.0), otherwise)
+
+
+def safe_sqrt(x: Array) -> Array:
+    """sqrt(x), and 0 where x is not positive, with a derivative of 0 there instead of an infinite one."""
+    positive = x > 0
+    return where(positive, sqrt(where(positive, x, 1.0)), 0.0)

@@ -1,8 +1,9 @@
 """Bracketed root finding with a fixed number of steps and no branches, alike for NumPy, JAX and Dr.Jit arrays."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from mpcam.math.arrays import Array, absolute, detach, where
+from mpcam.math.arrays import Array, absolute, detach, library, where
 
 _STEPS = 40
 
@@ -17,11 +18,11 @@ def invert_increasing(
     detached arguments), never from the iterations.
     """
     target = detach(value)
-    zero = target * 0.0
+    zero = 0.0 * (function(target * 0.0 + low) - target)  # of the type that the result has
     below, above = zero + low, zero + high
-    x = 0.5 * (below + above)
-    residual_before = zero + 1e30
-    for _ in range(_STEPS):
+
+    def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
+        below, above, x, residual_before = state
         residual = function(x) - target
         below = where(residual <= 0, x, below)
         above = where(residual > 0, x, above)
@@ -29,14 +30,28 @@ def invert_increasing(
         newton = x - residual / where(gradient > 0, gradient, 1.0)
         usable = (gradient > 0) & (newton > below) & (newton < above)
         usable = usable & (absolute(residual) < 0.5 * residual_before)
-        residual_before = absolute(residual)
         x = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
+        return below, above, x, absolute(residual)
+
+    _, _, x, _ = _repeat(step, (below, above, 0.5 * (below + above), zero + 1e30))
     first, last = target <= function(zero + low), target >= function(zero + high)
     x = where(first, zero + low, where(last, zero + high, x))
     x, gradient = detach(x), detach(slope(x))
     inside = ~(first | last)
     step = (function(x) - value) / where(gradient > 0, gradient, 1.0)
-    return where(inside & (gradient > 0), x - step, x)
+    # Only its derivative: where the slope nearly vanishes, the step itself is rounding noise.
+    return where(inside & (gradient > 0), x - (step - detach(step)), x)
+
+
+def _repeat(step: Callable[[Any], Any], state: Any) -> Any:
+    """The state after all steps; JAX compiles one step only."""
+    if library(*state) == "jax":
+        import jax
+
+        return jax.lax.fori_loop(0, _STEPS, lambda _, state: step(state), state)
+    for _ in range(_STEPS):
+        state = step(state)
+    return state
 
 
 def central_slope(function: Callable[[Array], Array], low: float, high: float) -> Callable[[Array], Array]:
@@ -50,3 +65,34 @@ def central_slope(function: Callable[[Array], Array], low: float, high: float) -
         return (function(right) - function(left)) / (right - left)
 
     return slope
+
+
+def polynomial(coefficients: Sequence[Array], x: Array) -> Array:
+    """coefficients[0] + coefficients[1] x + ..., by Horner's rule."""
+    value = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        value = value * x + coefficient
+    return value
+
+
+def sign_changes(coefficients: Sequence[float], low: float, high: float) -> list[float]:
+    """Where a polynomial with Python numbers as coefficients changes its sign in (low, high), in rising order.
+
+    Between two sign changes of its derivative a polynomial is monotone, so bisection misses none. Each result is the
+    last number before the change.
+    """
+    if len(coefficients) < 2:
+        return []
+    turns = sign_changes([i * c for i, c in enumerate(coefficients)][1:], low, high)
+    found = []
+    for start, end in zip([low, *turns], [*turns, high], strict=True):
+        rising = polynomial(coefficients, start) <= 0
+        if (polynomial(coefficients, end) > 0) != rising:
+            continue
+        while start < (middle := 0.5 * (start + end)) < end:
+            if (polynomial(coefficients, middle) > 0) == rising:
+                end = middle
+            else:
+                start = middle
+        found.append(start)
+    return found

@@ -22,6 +22,12 @@ def curved_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
     return box.low, box.high, box.valid
 
 
+def quads_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
+    """The box of the quads around a triangle's curved edges."""
+    box = camera.local_bound_quads(a, b, c)
+    return box.low, box.high, box.valid
+
+
 def image_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
     """Box of straight-edged image triangles; without an image where a corner is not finite."""
     import drjit as dr
@@ -32,12 +38,20 @@ def image_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
 
 @functools.lru_cache(maxsize=64)
 def _pipeline(
-    test: str, model: type | None, static: tuple[Any, ...], width: int, height: int, count: bool, backend: str
+    test: str,
+    bound: str,
+    model: type | None,
+    static: tuple[Any, ...],
+    width: int,
+    height: int,
+    count: bool,
+    backend: str,
 ) -> Any:
     """The frozen kernels of a test, an image size and, for curved images, a camera model and its static fields."""
     from mpcam_kernels.pipeline import Pipeline
 
-    return Pipeline(types(), curved_box if model else image_box, kernel_test(test), width, height, count)
+    box = quads_box if bound == "quad" else curved_box if model else image_box
+    return Pipeline(types(), box, kernel_test(test), width, height, count, exclude=bound == "tight")
 
 
 def kernel_test(name: str) -> Any:
@@ -54,6 +68,7 @@ class Buffered:
     """
 
     method: ClassVar[str]
+    bound: str = "tight"
 
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
         if max(camera.width, camera.height) > MOST_PIXELS:
@@ -103,7 +118,7 @@ class Buffered:
             camera, model = self.lens.on_device, type(self.camera)
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         size = (self.camera.width, self.camera.height)
-        kernels = _pipeline(self.test, model, static, *size, count, backend_name())
+        kernels = _pipeline(self.test, self.bound, model, static, *size, count, backend_name())
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
     def frame(self) -> Hits:

@@ -103,9 +103,12 @@ def device_lens(camera: Camera) -> Camera:
     lens = copy.copy(camera)
     object.__setattr__(lens, "camera_from_world", None)
     names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
-    numbers = [n for n in names if n not in (*camera.static_fields, "camera_from_world")]
-    for name, value in zip(numbers, opaque_numbers([float(getattr(camera, n)) for n in numbers]), strict=True):
-        object.__setattr__(lens, name, value)
+    values = {n: getattr(camera, n) for n in names if n not in (*camera.static_fields, "camera_from_world")}
+    numbers = [float(v) for value in values.values() for v in (value if isinstance(value, tuple) else (value,))]
+    on_device = iter(opaque_numbers(numbers))
+    for name, value in values.items():
+        several = isinstance(value, tuple)
+        object.__setattr__(lens, name, tuple(next(on_device) for _ in value) if several else next(on_device))
     return lens
 
 

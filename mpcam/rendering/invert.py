@@ -9,13 +9,16 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
 from mpcam.rendering.device import flat, to_camera, types
 
-BOUNDS = ("tight",)
+BOUNDS = ("tight", "quad")
 
 
 class Inverted(Buffered):
     """Frames by bounding each curved triangle and testing the rays of the pixels inside.
 
     Central cameras test rays through one point; parallel rays are straight in the image plane and are tested there.
+    bound: "tight" takes boxes from the tangents at the corners (from the bounding cone where edges turn much) and
+    drops blocks of pixels that one edge excludes; "quad" tests every pixel in the box of the quads around the curved
+    edges (Gascuel et al. 2008, 3.4).
     """
 
     method = "invert"
@@ -23,7 +26,12 @@ class Inverted(Buffered):
     def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight"):
         if bound not in BOUNDS:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
+        if bound == "quad" and not hasattr(camera, "local_bound_quads"):
+            raise InputError(
+                f"bound='quad' is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
+            )
         super().__init__(camera, mesh, "central" if camera.central else "planar")
+        self.bound = bound
 
     def place(self, vertices: Any) -> Any:
         import drjit as dr

@@ -33,9 +33,9 @@ class Prepared(Protocol):
 def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Prepared:
     """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
 
-    settings: `bound` ("tight") for invert; `level` (0 to 7) for vertex; `resolution` (pixels per face) for cubemap and
-    hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where a method cannot serve
-    the camera.
+    settings: `bound` ("tight" or "quad") for invert; `level` (0 to 7) for vertex; `resolution` (pixels per face) for
+    cubemap and hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where a method
+    cannot serve the camera.
     """
     if not isinstance(camera, Camera):
         raise InputError(

@@ -16,8 +16,8 @@ from mpcam.truth.variant import mitsuba
 class RayTraced:
     """Frames by tracing each pixel's ray through a tree over the triangles.
 
-    The same rays and the same float32 vertices as the kernels use. Triangles with a corner that is not finite, or
-    without area, are left out of the tree, which may not hold such numbers.
+    The same rays and the same float32 vertices as the kernels use. Triangles with a corner that is not
+    finite are left out of the tree, which may not hold such numbers.
     """
 
     method = "raytrace"

@@ -1,0 +1,197 @@
+"""What the calibrated lens models share: an image symmetric about the axis, scaled by fx and fy.
+
+A direction at angle theta from the axis and azimuth phi has the pixel (cx + fx r cos phi, cy + fy r sin phi), where
+r = f(theta) is the model's own. r is measured in focal lengths.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_quick
+from mpcam.cameras.profiles import Profile, bulges_outward
+from mpcam.cameras.symmetric import finite_pixel, finite_point, symmetric_image, symmetric_ray
+from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.errors import InputError
+from mpcam.math import PI, Array, Vector, detach, epsilon, library, maximum, minimum, vector, where
+
+FARTHEST = 1e6
+"""Images end at so many focal lengths from the centre, where a formula would go on to infinity."""
+
+NEARLY_PI = PI - 1e-6
+"""Domains of formulas with sin(theta) end here: float32 has no number so near to pi that its sine would be right."""
+
+_FAR = 1e9  # pixels; stands for infinity
+_SAMPLES = 2001
+_MARGIN = 1.05  # how much farther than the image's corners tight boxes reach
+
+
+@dataclasses.dataclass(frozen=True)
+class _View:
+    """A lens as the bounds of `arcs` want it: in focal lengths, around the origin."""
+
+    profile: Profile
+    fov: Array
+    radius: Array
+    cx: float = 0.0
+    cy: float = 0.0
+    pixels_per_radius: float = 1.0
+
+
+class Calibrated:
+    """Rays, images and boxes from the functions r = f(theta), f' and the inverse that a model supplies.
+
+    derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
+    edge, an angle beyond which nothing lands in the image; convex, whether images of straight lines bulge away from the
+    centre up to there (see `Profile`). They are None and False in cameras whose parameters are traced by JAX.
+    """
+
+    width: int
+    height: int
+    fx: Any
+    fy: Any
+    cx: Any
+    cy: Any
+    camera_from_world: Any
+    max_angle: Any
+    limit: Any
+    edge: Any
+    convex: bool
+
+    static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "convex")
+    shape_fields: ClassVar[tuple[str, ...]]
+    """Fields that decide f."""
+
+    def radius_at(self, theta: Array) -> Array:
+        """r = f(theta) in focal lengths, theta in radians from the axis."""
+        raise TypeError(f"{type(self).__name__} must define radius_at")
+
+    def slope_at(self, theta: Array) -> Array:
+        """f'(theta)."""
+        raise TypeError(f"{type(self).__name__} must define slope_at")
+
+    def angle_at(self, r: Array) -> Array:
+        """theta of r, up to the end of the domain."""
+        raise TypeError(f"{type(self).__name__} must define angle_at")
+
+    def largest_angle(self) -> Array:
+        """Where f stops increasing or goes beyond FARTHEST, radians."""
+        raise TypeError(f"{type(self).__name__} must define largest_angle")
+
+    def _check_lens(self) -> None:
+        """Check the fields that all models have, and derive the domain."""
+        for name in ("fx", "fy"):
+            self._check_number(name, 0)  # pyright: ignore[reportAttributeAccessIssue]
+        for name in ("cx", "cy", "max_angle"):
+            self._check_number(name)  # pyright: ignore[reportAttributeAccessIssue]
+        if library(self.max_angle) == "numpy" and not 0 < self.max_angle <= PI:
+            raise InputError(
+                f"{type(self).__name__}(max_angle={self.max_angle!r}): radians above 0 and at most pi are needed"
+            )
+        numbers = [self.fx, self.fy, self.cx, self.cy, self.max_angle, *self._shape()]
+        known = library(*numbers) == "numpy"
+        limit = float(minimum(self.max_angle, self.largest_angle())) if known else None
+        object.__setattr__(self, "limit", limit)
+        object.__setattr__(self, "edge", self._image_angle(limit) if limit else None)
+        object.__setattr__(self, "convex", bool(limit) and self._bulges())
+
+    def _shape(self) -> list[Array]:
+        values = [getattr(self, name) for name in self.shape_fields]
+        return [number for value in values for number in (value if isinstance(value, tuple) else (value,))]
+
+    def _image_angle(self, limit: float) -> float:
+        """An angle at which all radii that occur in the image are passed."""
+        theta = np.linspace(0.0, limit, _SAMPLES)
+        across = max(abs(self.cx), abs(self.width - self.cx)) / self.fx
+        down = max(abs(self.cy), abs(self.height - self.cy)) / self.fy
+        passed = int(np.searchsorted(self.radius_at(theta), _MARGIN * np.hypot(across, down)))
+        return float(theta[min(passed, _SAMPLES - 1)])
+
+    def _bulges(self) -> bool:
+        theta = np.linspace(0.0, self.edge, _SAMPLES)
+        return bulges_outward(theta, np.asarray(self.radius_at(theta)))
+
+    def angle_limit(self) -> Array:
+        """Largest angle of the domain, radians; a constant to gradients."""
+        return detach(minimum(self.max_angle, self.largest_angle())) if self.limit is None else self.limit
+
+    def _profile(self, limit: Array, convex: bool = False) -> Profile:
+        return Profile(type(self).__name__, self.radius_at, self.slope_at, self.angle_at, limit, True, convex)
+
+    @property
+    def domain(self) -> Domain:
+        """The largest angle, and the radius in pixels (the larger one of an ellipse) of the image that ends there.
+
+        The radius is None where f goes to infinity.
+        """
+        limit = self.angle_limit()
+        radius = self.radius_at(limit)
+        if library(radius) == "numpy" and radius > 0.9 * FARTHEST:
+            return Domain(limit, None)
+        return Domain(limit, maximum(self.fx, self.fy) * radius)
+
+    def local_ray(self, pixel: Vector) -> Ray:
+        """Ray of a pixel in the camera frame; valid in the image of the domain."""
+        u, v, valid = finite_pixel(pixel)
+        limit = self.angle_limit()
+        x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
+        return symmetric_ray(self._profile(limit), x, y, detach(self.radius_at(limit)), valid)
+
+    def local_project(self, point: Vector) -> tuple[Projection, ...]:
+        """Image of a point in the camera frame; valid in the domain, not at the camera's centre."""
+        point, depth, valid = finite_point(point)
+        image, inside = self.local_image(point)
+        valid = valid & inside
+        pixel = vector(where(valid, image[0], self.cx), where(valid, image[1], self.cy))
+        return (Projection(pixel, depth, valid),)
+
+    def local_image(self, point: Vector) -> tuple[Vector, Array]:
+        """Pixel of a point, and whether it lies in the domain; beyond it, the pixel is on its rim."""
+        limit = self.angle_limit()
+        x, y, theta = symmetric_image(self._profile(limit), point)
+        inside = theta <= limit + 4 * PI * epsilon(theta)
+        return vector(self.cx + self.fx * x, self.cy + self.fy * y), inside
+
+    def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """Box of the curved triangle, exact to about 0.01 pixel for what lies in the image.
+
+        Parts that are farther out count as infinitely far in the quadrants that they may be in. Where f is not convex,
+        or not known yet (JAX), the box is that of an annular sector.
+        """
+        return self._bound(radial_bound, a, b, c)
+
+    def local_bound_quick(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """A cheaper conservative box, as tight for small triangles."""
+        return self._bound(radial_bound_quick, a, b, c)
+
+    def _bound(self, bound: Callable[..., Box], a: Vector, b: Vector, c: Vector) -> Box:
+        limit = self.angle_limit()
+        edge = limit if self.limit is None else self.edge
+        convex = self.limit is not None and self.convex
+        view = _View(self._profile(limit, convex), 2.0 * edge, self.radius_at(edge))
+        inner, outer = bound(view, a, b, c), outer_bound(view, limit, a, b, c)
+        low, high = [], []
+        for i, (centre, focal) in enumerate(((self.cx, self.fx), (self.cy, self.fy))):
+            smallest, largest = where(inner.valid, inner.low[i], _FAR), where(inner.valid, inner.high[i], -_FAR)
+            smallest = where(outer.valid, minimum(smallest, outer.low[i]), smallest)
+            largest = where(outer.valid, maximum(largest, outer.high[i]), largest)
+            low.append(maximum(minimum(centre + focal * smallest, _FAR), -_FAR))
+            high.append(maximum(minimum(centre + focal * largest, _FAR), -_FAR))
+        return Box(vector(*low), vector(*high), inner.valid | outer.valid)
+
+    def __repr__(self) -> str:
+        names = ("fx", "fy", "cx", "cy", *self.shape_fields)
+        numbers = ", ".join(f"{name}={_short(getattr(self, name))}" for name in names)
+        if library(self.max_angle) != "numpy" or self.max_angle < PI:
+            numbers += f", max_angle={_short(self.max_angle)}"
+        if library(self.camera_from_world) == "numpy" and not np.array_equal(self.camera_from_world, np.eye(4)):
+            numbers += f", eye={_short(tuple(map(float, self.eye)))}"  # pyright: ignore[reportAttributeAccessIssue]
+        return f"{type(self).__name__}({self.width}, {self.height}, {numbers})"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_short, value))})"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,81 @@
+"""Images that are symmetric about the optical axis: theta, the angle from the axis, lands at radius f(theta).
+
+Everything here is in the units of the profile; cameras shift and scale it to pixels.
+"""
+
+from mpcam.cameras.profiles import Profile
+from mpcam.cameras.types import Ray
+from mpcam.math import (
+    Array,
+    Vector,
+    atan2,
+    cos,
+    epsilon,
+    isfinite,
+    maximum,
+    minimum,
+    norm,
+    sin,
+    sqrt,
+    vector,
+    where,
+)
+
+
+def finite_pixel(pixel: Vector) -> tuple[Array, Array, Array]:
+    """u and v, 0 where they are not finite, and whether they are."""
+    u, v = pixel
+    finite = isfinite(u) & isfinite(v)
+    return where(finite, u, 0.0), where(finite, v, 0.0), finite
+
+
+def symmetric_ray(profile: Profile, x: Array, y: Array, rim: Array, valid: Array) -> Ray:
+    """Ray of an image point relative to the centre; valid up to the radius `rim`, where it was valid before."""
+    squared = x * x + y * y
+    distance = sqrt(where(squared > 0, squared, 1.0))
+    rim = rim * (1.0 + 4.0 * epsilon(distance))
+    valid = valid & (squared <= rim * rim)
+    off_axis = valid & (squared > 0)
+    distance = where(off_axis, distance, 1.0)  # 1 stands for points that do not matter
+    theta = profile.angle(where(off_axis, distance, 0.0))
+    sideways = where(off_axis, sin(theta) / distance, 0.0)
+    zero = 0.0 * x
+    inside = where(valid, 1.0, 0.0)
+    # At the centre the slope of the direction in the image point is 1 / f'(0).
+    centre = 1.0 / profile.slope(zero)
+    direction = vector(
+        where(off_axis, x * sideways * inside, x * centre * inside),
+        where(off_axis, y * sideways * inside, y * centre * inside),
+        where(valid, cos(theta), 1.0),
+    )
+    return Ray(vector(zero, zero, zero), direction, valid)
+
+
+def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Array]:
+    """Image point (x, y) of a point in the camera frame, and its angle from the axis.
+
+    Beyond the reach of the profile, the image point is that of its reach.
+    """
+    x, y, z = point
+    largest = maximum(maximum(abs(x), abs(y)), abs(z))
+    scale = 1.0 / where(largest > 0, largest, 1.0)
+    x, y, z = x * scale, y * scale, z * scale
+    squared = x * x + y * y
+    off_axis = squared > 0
+    rho = sqrt(where(off_axis, squared, 1.0))
+    theta = atan2(where(off_axis, rho, 0.0), z)
+    reach = minimum(theta, profile.reach)
+    ahead = where(z > 0, z, 1.0)
+    ratio = where(off_axis, profile.radius(reach) / rho, profile.slope(0.0 * rho) / ahead)
+    # Straight behind the camera the image is the whole circle; its point to the right stands for it.
+    behind = where(off_axis | (z >= 0), 0.0, profile.radius(reach))
+    return ratio * x + behind, ratio * y, theta
+
+
+def finite_point(point: Vector) -> tuple[Vector, Array, Array]:
+    """The point, or the camera's centre if it is not finite; its distance; and whether it is finite and off centre."""
+    x, y, z = point
+    finite = isfinite(x) & isfinite(y) & isfinite(z)
+    point = vector(where(finite, x, 0.0), where(finite, y, 0.0), where(finite, z, 0.0))
+    depth = norm(point)
+    return point, depth, finite & (depth > 0)
