@@ -11,7 +11,7 @@ from mpcam.math import PI, Array, atan2, cos, maximum, minimum, safe_sqrt, sin, 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class DoubleSphere(Calibrated, Camera):
-    """r = rho / (alpha d2 + (1 - alpha) (xi d1 + z)), d1 = |(x, y, z)|, d2 = |(x, y, xi d1 + z)|, rho = |(x, y)|.
+    """r = rho / (alpha d2 + (1 - alpha) (xi d1 + z)), d1 = norm(x, y, z), d2 = norm(x, y, xi d1 + z), rho = norm(x, y).
 
     Usenko, Demmel and Cremers 2018, equations 40 to 51. A point lands on a unit sphere, from there, seen from a centre
     shifted by xi, on a second one, and from there, seen from a centre shifted by alpha / (1 - alpha), in the image.

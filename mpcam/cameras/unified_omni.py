@@ -13,7 +13,7 @@ _ENDLESS = 1e15  # whose square float32 can hold
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class UnifiedOmni(Calibrated, Camera):
-    """r = rho / (alpha d + (1 - alpha) z), d = sqrt(beta rho^2 + z^2), rho = |(x, y)|.
+    """r = rho / (alpha d + (1 - alpha) z), d = sqrt(beta rho^2 + z^2), rho = norm(x, y).
 
     The enhanced unified camera model (Khomutenko, Garcia and Martinet 2016, equation 5). With beta = 1 it is the
     unified model of Mei and Rives 2007 without distortion: see `mei`, which takes that form's parameters.
@@ -62,7 +62,7 @@ class UnifiedOmni(Calibrated, Camera):
         camera_from_world: Any = None,
         max_angle: Any = PI,
     ) -> Self:
-        """r = rho / (z + xi |(x, y, z)|) in units of gamma_x, gamma_y: Mei and Rives 2007; Kalibr's omni, OpenCV's.
+        """r = rho / (z + xi norm(x, y, z)) in units of gamma_x, gamma_y: Mei and Rives 2007; Kalibr's omni, OpenCV's.
 
         xi: 0 (a pinhole) or more; up to 1, r is infinite where cos theta = -xi; beyond, it is largest where
         cos theta = -1 / xi. Raises InputError as the class does.

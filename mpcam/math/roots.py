@@ -13,7 +13,7 @@ def invert_increasing(
 ) -> Array:
     """x in [low, high] with function(x) = value, for an increasing function.
 
-    Newton's step where it stays inside the bracket and at least halves the residual, bisection otherwise. Values
+    Newton's step where it stays inside the bracket and is less than half the step before, bisection otherwise. Values
     beyond the ends give the nearer end. The derivative comes from the implicit-function theorem (one Newton step on
     detached arguments), never from the iterations.
     """
@@ -22,18 +22,18 @@ def invert_increasing(
     below, above = zero + low, zero + high
 
     def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
-        below, above, x, residual_before = state
+        below, above, x, step_before = state
         residual = function(x) - target
         below = where(residual <= 0, x, below)
         above = where(residual > 0, x, above)
         gradient = slope(x)
         newton = x - residual / where(gradient > 0, gradient, 1.0)
         usable = (gradient > 0) & (newton > below) & (newton < above)
-        usable = usable & (absolute(residual) < 0.5 * residual_before)
-        x = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
-        return below, above, x, absolute(residual)
+        usable = usable & (absolute(newton - x) < 0.5 * step_before)
+        after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
+        return below, above, after, absolute(after - x)
 
-    _, _, x, _ = _repeat(step, (below, above, 0.5 * (below + above), zero + 1e30))
+    _, _, x, _ = _repeat(step, (below, above, 0.5 * (below + above), above - below))
     first, last = target <= function(zero + low), target >= function(zero + high)
     x = where(first, zero + low, where(last, zero + high, x))
     x, gradient = detach(x), detach(slope(x))

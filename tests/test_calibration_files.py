@@ -1,0 +1,429 @@
+"""Calibration files: each format against its own program, round trips, pixel centres, axes, and mistakes by line."""
+
+import json
+from typing import Any
+
+import cv2
+import numpy as np
+import pycolmap
+import pytest
+import yaml
+
+import mpcam as mp
+from mpcam.cameras.serialize import camera_to_dict
+from mpcam.io import calibration_colmap, calibration_kalibr, calibration_nerfstudio, calibration_opencv
+from mpcam.io.cameras import load_camera
+
+POSE = mp.look_at((0.3, -0.2, 0.1), (0.5, 1.0, 0.7))
+OTHER = mp.look_at((1.3, 0.2, 0.1), (0.5, 1.0, 0.7))
+K = (0.0034, 0.0007, -0.002, 0.0002)
+
+PINHOLE = mp.Pinhole(640, 480, 500.1, 501.2, 320.3, 240.4)
+FISHEYE = mp.KannalaBrandt(512, 400, 190.97, 190.93, 254.93, 196.89, K)
+DOUBLE = mp.DoubleSphere(752, 480, 349.7, 348.7, 365.8, 249.3, -0.24, 0.567)
+UNIFIED = mp.UnifiedOmni(752, 480, 460.7, 459.3, 365.8, 249.3, 0.59, 1.1)
+MEI = mp.UnifiedOmni.mei(640, 480, 707.1, 706.8, 321.0, 243.5, 1.25)
+
+HELD = {
+    "colmap": [PINHOLE, FISHEYE, UNIFIED, MEI],
+    "opencv": [PINHOLE, FISHEYE, MEI],
+    "kalibr": [PINHOLE, FISHEYE, DOUBLE, UNIFIED, MEI],
+    "nerfstudio": [PINHOLE, FISHEYE],
+}
+SUFFIX = {"colmap": "txt", "opencv": "yml", "kalibr": "yaml", "nerfstudio": "json"}
+NAMES = {"colmap": ["1", "7"], "opencv": ["left"], "kalibr": ["cam0", "cam1"], "nerfstudio": ["a/1.png", "a/2.png"]}
+POSED = ("kalibr", "nerfstudio")
+
+
+def same(camera, other):
+    """Whether two cameras are equal up to rounding."""
+    a, b = (camera_to_dict(c) for c in (camera, other))
+    keys = [key for key in a if key != "model"]
+    return a["model"] == b["model"] and all(np.allclose(a[k], b[k], rtol=1e-14, atol=1e-13) for k in keys)
+
+
+@pytest.mark.parametrize(("style", "camera"), [(s, c) for s, cameras in HELD.items() for c in cameras])
+def test_round_trip(tmp_path, style, camera):
+    path = tmp_path / f"file.{SUFFIX[style]}"
+    poses = {"kalibr": [np.eye(4), OTHER], "nerfstudio": [POSE, OTHER]}.get(style, [np.eye(4)] * 2)
+    cameras = {name: camera.with_pose(pose) for name, pose in zip(NAMES[style], poses, strict=False)}
+    mp.write_calibration(path, cameras, style)
+    for again in (mp.read_calibration(path), mp.read_calibration(path, style)):
+        assert list(again) == list(cameras)
+        assert all(same(again[name], cameras[name]) for name in cameras)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("style", HELD)
+def test_a_camera_without_a_name(tmp_path, style):
+    path = tmp_path / f"file.{SUFFIX[style]}"
+    mp.write_calibration(path, FISHEYE, style)
+    (again,) = mp.read_calibration(path).values()
+    assert same(again, FISHEYE)
+    if style != "nerfstudio":
+        assert same(load_camera(path), FISHEYE)
+
+
+@pytest.mark.parametrize(
+    ("style", "camera"),
+    [("colmap", DOUBLE), ("opencv", DOUBLE), ("opencv", UNIFIED), ("nerfstudio", DOUBLE), ("nerfstudio", UNIFIED)]
+    + [(style, mp.Radial.equidistant(64, 64)) for style in HELD],
+)
+def test_models_that_a_format_cannot_hold(tmp_path, style, camera):
+    path = tmp_path / "file"
+    with pytest.raises(mp.InputError, match="has no model for a|with beta = 1") as caught:
+        mp.write_calibration(path, camera, style)
+    assert "\n" not in str(caught.value)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("camera", [FISHEYE, PINHOLE, UNIFIED])
+def test_colmap_reads_what_is_written_and_the_other_way(tmp_path, camera):
+    mp.write_calibration(tmp_path / "cameras.txt", {"3": camera})
+    for name in ("images.txt", "points3D.txt", "rigs.txt", "frames.txt"):
+        (tmp_path / name).write_text("")
+    theirs = pycolmap.Reconstruction()
+    theirs.read_text(str(tmp_path)) if False else None
+    line = (tmp_path / "cameras.txt").read_text().splitlines()[-1].split()
+    theirs = pycolmap.Camera(
+        model=line[1], width=int(line[2]), height=int(line[3]), params=[float(x) for x in line[4:]]
+    )
+    points = np.random.default_rng(1).uniform(-1, 1, (50, 3)) + [0, 0, 2]
+    assert np.abs(theirs.img_from_cam(points) - camera.project(points).pixel[:, 0]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("SIMPLE_PINHOLE", [300, 321, 239]),
+        ("SIMPLE_RADIAL", [300, 321, 239, 0]),
+        ("OPENCV", [300, 301, 321, 239, 0, 0, 0, 0]),
+        ("SIMPLE_FISHEYE", [300, 321, 239]),
+        ("FISHEYE", [300, 301, 321, 239]),
+        ("SIMPLE_RADIAL_FISHEYE", [300, 321, 239, 0.02]),
+        ("RADIAL_FISHEYE", [300, 321, 239, 0.02, -0.003]),
+        ("THIN_PRISM_FISHEYE", [300, 301, 321, 239, 0.02, -0.003, 0, 0, 0.001, -0.0002, 0, 0]),
+        ("RAD_TAN_THIN_PRISM_FISHEYE", [300, 301, 321, 239, 0.02, -0.003, 0.001, -2e-4, 0, 0, 0, 0, 0, 0, 0, 0]),
+        ("OPENCV_FISHEYE", [300, 301, 321, 239, 0.02, -0.003, 0.001, -0.0002]),
+        ("EUCM", [300, 301, 321, 239, 0.55, 1.2]),
+    ],
+)
+def test_colmap_models(tmp_path, model, parameters):
+    path = tmp_path / "cameras.txt"
+    path.write_text(f"# comment\n\n5 {model} 640 480 {' '.join(map(str, parameters))}\n")
+    ours = mp.read_calibration(path)["5"]
+    theirs = pycolmap.Camera(model=model, width=640, height=480, params=parameters)
+    points = np.random.default_rng(2).uniform(-1, 1, (50, 3)) + [0, 0, 2]
+    assert np.abs(theirs.img_from_cam(points) - ours.project(points).pixel[:, 0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE, MEI])
+def test_opencv_reads_what_is_written(tmp_path, camera):
+    path = tmp_path / "camera.yml"
+    mp.write_calibration(path, camera, "opencv")
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    matrix, distortion = file.getNode("camera_matrix").mat(), file.getNode("distortion_coefficients").mat()
+    assert (file.getNode("image_width").real(), file.getNode("image_height").real()) == (camera.width, camera.height)
+    points, zero = np.random.default_rng(3).uniform(-1, 1, (50, 1, 3)) + [0, 0, 2], np.zeros(3)
+    if camera is FISHEYE:
+        assert file.getNode("fisheye_model").real() == 1
+        theirs, _ = cv2.fisheye.projectPoints(points, zero, zero, matrix, distortion)
+    elif camera is MEI:
+        xi = file.getNode("xi").real()
+        theirs, _ = cv2.omnidir.projectPoints(points, zero, zero, matrix, xi, distortion)
+    else:
+        theirs, _ = cv2.projectPoints(points, zero, zero, matrix, distortion)
+    ours = camera.project(points[:, 0]).pixel[:, 0]
+    assert np.abs(theirs.reshape(-1, 2) + 0.5 - ours).max() < 1e-9
+
+
+@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE, MEI])
+def test_what_opencv_writes_is_read(tmp_path, camera):
+    path = tmp_path / "camera.yml"
+    scale = 1 + camera.xi if camera is MEI else 1.0
+    matrix = np.array([[scale * camera.fx, 0, camera.cx - 0.5], [0, scale * camera.fy, camera.cy - 0.5], [0, 0, 1]])
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    file.write("calibration_time", "Sun Nov 22 00:04:44 2026")
+    file.write("image_width", camera.width)
+    file.write("image_height", camera.height)
+    file.writeComment("flags: +fix_skew")
+    file.write("camera_matrix", matrix)
+    file.write("distortion_coefficients", np.array(getattr(camera, "k", [0.0] * 4))[:, None])
+    if camera is FISHEYE:
+        file.write("fisheye_model", 1)
+    elif camera is MEI:
+        file.write("xi", np.array([[camera.xi]]))
+    file.release()
+    assert same(mp.read_calibration(path)["camera"], camera)
+    older = path.read_text().replace("%YAML 1.2", "%YAML:1.0")
+    path.write_text(older)
+    assert older.startswith("%YAML:1.0")
+    assert same(mp.read_calibration(path)["camera"], camera)
+
+
+def test_ros_camera_info_is_read(tmp_path):
+    path = tmp_path / "info.yaml"
+    path.write_text(
+        "image_width: 512\nimage_height: 400\ncamera_name: front\ndistortion_model: equidistant\n"
+        "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [190.97, 0, 254.43, 0, 190.93, 196.39, 0, 0, 1]\n"
+        "distortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [3.4e-3, 7e-4, -2e-3, 2e-4]\n"
+    )
+    assert same(mp.read_calibration(path)["front"], FISHEYE)
+
+
+def test_half_a_pixel():
+    """The centre of the first pixel is (0, 0) for OpenCV and Kalibr, (0.5, 0.5) here, for COLMAP and nerfstudio.
+
+    A camera whose axis goes through the middle of a 4 x 2 image has its principal point at (1.5, 0.5) there.
+    """
+    middle = mp.Pinhole(4, 2, 3, 3, 2.0, 1.0)
+    assert "data: [ 3.0, 0.0, 1.5, 0.0, 3.0, 0.5, 0.0, 0.0, 1.0 ]" in calibration_opencv.write({"a": middle})
+    assert "intrinsics: [3.0, 3.0, 1.5, 0.5]" in calibration_kalibr.write({"cam0": middle})
+    assert "1 PINHOLE 4 2 3.0 3.0 2.0 1.0" in calibration_colmap.write({"1": middle})
+    written = json.loads(calibration_nerfstudio.write({"a.png": middle}))
+    assert (written["cx"], written["cy"]) == (2.0, 1.0)
+
+
+CAMCHAIN = """cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [0.0034, 0.0007,
+    -0.002, 0.0002]
+  distortion_model: equidistant
+  intrinsics: [190.97, 190.93, 254.43, 196.39]
+  resolution: [512, 400]
+  rostopic: /cam0/image_raw
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.1]
+  - - 0.0
+    - 1.0
+    - 0.0
+    - 0.0
+  - [0.0, 0.0, 1.0, 0.02]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: ds
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [-0.24, 0.567, 349.7, 348.7, 365.3, 248.8]
+  resolution: [752, 480]
+cam2:
+  T_cn_cnm1: [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0.5], [0, 0, 0, 1]]
+  camera_model: omni
+  distortion_coeffs: [0, 0, 0, 0]
+  distortion_model: radtan
+  intrinsics: [1.25, 707.1, 706.8, 320.5, 243.0]
+  resolution: [640, 480]
+cam3:
+  T_cn_cnm1: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+  camera_model: eucm
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [0.59, 1.1, 460.7, 459.3, 365.3, 248.8]
+  resolution: [752, 480]
+cam4:
+  T_cn_cnm1: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+  camera_model: pinhole
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [500.1, 501.2, 319.8, 239.9]
+  resolution: [640, 480]
+"""
+
+
+def test_kalibr_chain(tmp_path):
+    path = tmp_path / "camchain.yaml"
+    path.write_text(CAMCHAIN)
+    cameras = mp.read_calibration(path)
+    for (name, camera), expected in zip(cameras.items(), [FISHEYE, DOUBLE, MEI, UNIFIED, PINHOLE], strict=True):
+        assert same(camera.with_pose(np.eye(4)), expected), name
+    assert np.array_equal(cameras["cam0"].camera_from_world, np.eye(4))
+    # A point in front of cam0 is 0.1 to the left in cam1, whose z is cam2's x.
+    point = np.array([0.0, 0.0, 2.0])
+    assert np.allclose(cameras["cam1"].local(point), [-0.1, 0, 2.02])
+    assert np.allclose(cameras["cam2"].local(point), [2.02, 0, 0.6])
+    assert np.allclose(cameras["cam4"].local(point), [2.02, 0, 0.6])
+
+
+def test_what_is_written_for_kalibr_is_yaml(tmp_path):
+    path = tmp_path / "chain.yaml"
+    tiny = mp.KannalaBrandt(512, 400, 190.97, 190.93, 254.93, 196.89, (1e-5, 1e-300, 0, 2))
+    mp.write_calibration(path, {"cam0": tiny, "cam1": DOUBLE.with_pose(POSE)}, "kalibr")
+    theirs = yaml.safe_load(path.read_text())
+    assert theirs["cam0"]["distortion_coeffs"] == [1e-5, 1e-300, 0, 2]
+    assert np.allclose(theirs["cam1"]["T_cn_cnm1"], POSE, atol=1e-15)
+
+
+def test_relative_poses_are_kept_by_kalibr(tmp_path):
+    mp.write_calibration(
+        tmp_path / "a.yaml", {"cam0": PINHOLE.with_pose(POSE), "cam1": DOUBLE.with_pose(OTHER)}, "kalibr"
+    )
+    cameras = mp.read_calibration(tmp_path / "a.yaml")
+    assert np.allclose(cameras["cam1"].camera_from_world, OTHER @ np.linalg.inv(POSE), atol=1e-12)
+
+
+def test_nerfstudio_axes(tmp_path):
+    """The identity looks along -z with y up; ours along +z with y down."""
+    path = tmp_path / "transforms.json"
+    frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
+    lens = {"fl_x": 10, "fl_y": 11, "cx": 4, "cy": 3, "w": 8, "h": 6}
+    path.write_text(json.dumps({"camera_model": "OPENCV", **lens, "k1": 0, "p2": 0.0, "frames": [frame]}))
+    camera = load_camera(path)
+    ray = camera.ray([[4, 3], [4, 0]])
+    assert np.allclose(ray.direction[0], [0, 0, -1])
+    assert ray.direction[1, 1] > 0, "the top of the image is up"
+    moved = np.eye(4)
+    moved[:3, 3] = [1, 2, 3]
+    path.write_text(json.dumps({**lens, "frames": [{**frame, "transform_matrix": moved.tolist()}]}))
+    assert np.allclose(load_camera(path).eye, [1, 2, 3])
+
+
+def test_nerfstudio_intrinsics_per_frame(tmp_path):
+    path = tmp_path / "transforms.json"
+    other = mp.KannalaBrandt(512, 400, 200, 201, 250, 190, (0, 0, 0, 0), OTHER)
+    mp.write_calibration(path, {"a.png": FISHEYE.with_pose(POSE), "b.png": other})
+    data = json.loads(path.read_text())
+    assert data["camera_model"] == "OPENCV_FISHEYE"
+    assert "fl_x" not in data
+    cameras = mp.read_calibration(path)
+    assert same(cameras["a.png"], FISHEYE.with_pose(POSE))
+    assert same(cameras["b.png"], other)
+    with pytest.raises(mp.InputError, match="2 cameras .a.png, b.png.: one is needed"):
+        load_camera(path)
+
+
+def test_instant_ngp_angle(tmp_path):
+    path = tmp_path / "transforms.json"
+    frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
+    path.write_text(json.dumps({"camera_angle_x": np.pi / 2, "w": 8, "h": 6, "frames": [frame]}))
+    camera: Any = mp.read_calibration(path)["a.png"]
+    assert np.allclose([camera.fx, camera.fy, camera.cx, camera.cy], [4, 4, 4, 3])
+    path.write_text(json.dumps({"is_fisheye": True, "fl_x": 3, "w": 8, "h": 6, "frames": [frame]}))
+    assert isinstance(mp.read_calibration(path)["a.png"], mp.KannalaBrandt)
+
+
+OPENCV = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500., 0., 320., 0., 500., 240., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ 0.1, 0., 0., 0. ]
+"""
+FRAME = {"file_path": "a", "transform_matrix": np.eye(4).tolist(), "fl_x": 3, "w": 8, "h": 6}
+
+
+def transforms(**changes):
+    return json.dumps({"frames": [FRAME | changes]})
+
+
+MISTAKES = [
+    ("colmap", "", "there is no camera in it"),
+    ("colmap", "1 PINHOLE 640\n", ":1: a camera needs"),
+    ("colmap", "1 PINHOLE 640 480 1 2 3\n", r":1: PINHOLE has 4 parameters \(fx, fy, cx, cy\), not 3"),
+    ("colmap", "1 PINHOLE 640 480 1 2 3 4\n1 PINHOLE 6 4 1 2 3 4\n", ":2: camera 1 is there twice"),
+    ("colmap", "1 FOV 640 480 1 2 3 4 5\n", ":1: the model FOV is not known here: allowed are SIMPLE_PINHOLE"),
+    ("colmap", "1 PINHOLE 640 480 1 2 x 4\n", ":1: cx: a finite number is needed, got 'x'"),
+    ("colmap", "1 PINHOLE 640.5 480 1 2 3 4\n", "the image size is 640.5 x 480"),
+    ("colmap", "1 PINHOLE 640 480 -1 2 3 4\n", r":1: Pinhole\(fx=-1"),
+    ("colmap", "1 OPENCV 640 480 1 2 3 4 .1 0 0 0\n", "the distortion of OPENCV is not zero"),
+    ("colmap", "1 THIN_PRISM_FISHEYE 640 480 1 2 3 4 0 0 .1 0 0 0 0 0\n", "the distortion p1, p2, .* is not zero"),
+    ("opencv", OPENCV, "add fisheye_model: 1 or 0"),
+    ("opencv", OPENCV + "fisheye_model: 0\n", "radial and tangential distortion is not zero"),
+    ("opencv", OPENCV + "xi: 1.2\n", "the distortion beside xi is not zero"),
+    ("opencv", OPENCV + "distortion_model: omnidir\n", "'omnidir' is not known here: allowed are fisheye"),
+    ("opencv", OPENCV.replace("0., 320.", "2., 320."), "camera_matrix has skew"),
+    ("opencv", OPENCV.replace("500., 0., 320.", "500., 320."), "camera_matrix: 8 numbers are there, 9 are needed"),
+    ("opencv", OPENCV.replace("image_width: 640\n", ""), "image_width is missing"),
+    ("opencv", OPENCV.replace("640", ".Nan"), "the image size: a finite number is needed"),
+    ("opencv", OPENCV.replace("rows: 4", "rows: 5"), "4 numbers are there, 5 x 1 are needed"),
+    ("opencv", OPENCV.replace("[ 0.1,", "[ a,") + "fisheye_model: 1\n", "data: a finite number is needed, got 'a'"),
+    ("opencv", OPENCV + "image_width: 3\n", ":15: not YAML .*: the key image_width is there twice"),
+    ("opencv", "camera_matrix: [1, 2\n", ":2: not YAML as calibration files use it"),
+    ("opencv", "camera_matrix: !!python/name:os.system x\n", ":1: not YAML .*could not determine a constructor"),
+    ("opencv", "camera_matrix: 3\nimage_width: 1\nimage_height: 1\n", "camera_matrix: a mapping .* got 3"),
+    ("kalibr", CAMCHAIN.replace("cam2", "cam9"), "cam0, cam1, ... are needed, without gaps"),
+    ("kalibr", CAMCHAIN.replace("equidistant", "radtan"), "cam0: radial and tangential distortion is not zero"),
+    ("kalibr", CAMCHAIN.replace("equidistant", "spline"), "cam0: distortion_model 'spline' is not known here"),
+    ("kalibr", CAMCHAIN.replace("pinhole", "thin"), "cam0: camera_model 'thin' is not known here: allowed are pinhole"),
+    ("kalibr", CAMCHAIN.replace("[0, 0, 0, 0]", "[0.1, 0, 0, 0]", 1), "cam2: radtan distortion of omni is not zero"),
+    (
+        "kalibr",
+        CAMCHAIN.replace("distortion_model: radtan", "distortion_model: equidistant"),
+        "cam2: no camera of mpcam",
+    ),
+    ("kalibr", CAMCHAIN.replace("[-0.24, 0.567,", "["), "cam1: intrinsics: 4 numbers are there, 6 are needed"),
+    ("kalibr", CAMCHAIN.replace("-0.24", "-2"), r"cam1: DoubleSphere\(xi=-2"),
+    ("kalibr", CAMCHAIN.replace("T_cn_cnm1", "T_cam_imu"), "cam1: T_cn_cnm1 is missing"),
+    (
+        "kalibr",
+        CAMCHAIN.replace("[1.0, 0.0, 0.0, -0.1]", "[2.0, 0.0, 0.0, -0.1]"),
+        "cam1: camera_from_world is not a rigid",
+    ),
+    ("kalibr", CAMCHAIN.replace("[1.0, 0.0, 0.0, -0.1]", "[1.0, 0.0, 0.0]"), "cam1: T_cn_cnm1: four rows of four"),
+    ("kalibr", CAMCHAIN.replace("-0.002, 0.0002", "-0.002"), "cam0: a fisheye needs 4 distortion coefficients"),
+    ("kalibr", "cam0: 3\n", "cam0: a mapping"),
+    ("kalibr", "cam0: &a\n  x: *a\n", ":1: not YAML"),
+    ("nerfstudio", "{", "not JSON"),
+    ("nerfstudio", "[" * 100000, "not JSON"),
+    ("nerfstudio", "{}", "frames is missing"),
+    ("nerfstudio", '{"frames": []}', "a list with at least one frame"),
+    ("nerfstudio", '{"frames": [3]}', r"frames\[0\]: a mapping"),
+    ("nerfstudio", transforms(k1=0.1), "radial and tangential distortion is not zero"),
+    ("nerfstudio", transforms(camera_model="OPENCV_FISHEYE", p1=0.1), "p1 and p2 of a fisheye are not zero"),
+    ("nerfstudio", transforms(camera_model="EQUIRECTANGULAR"), "'EQUIRECTANGULAR' is not known here"),
+    ("nerfstudio", transforms(w=None), "w is missing"),
+    ("nerfstudio", transforms(fl_x=None), "fl_x is missing"),
+    ("nerfstudio", transforms(fl_x=None, camera_angle_x=4), "camera_angle_x is 4"),
+    ("nerfstudio", transforms(fl_x=True), "fl_x: a finite number is needed, got True"),
+    ("nerfstudio", transforms(transform_matrix=[[1]]), "transform_matrix: four rows of four numbers"),
+    ("nerfstudio", transforms(transform_matrix=(2 * np.eye(4)).tolist()), "not a rigid transform"),
+    ("nerfstudio", json.dumps({"frames": [FRAME, FRAME]}), r"frames\[1\]: file_path 'a' is there twice"),
+]
+
+
+@pytest.mark.parametrize(("style", "text", "message"), MISTAKES)
+def test_mistakes_are_named(tmp_path, style, text, message):
+    path = tmp_path / "file"
+    path.write_text(text)
+    with pytest.raises(mp.InputError, match=message) as caught:
+        mp.read_calibration(path, style)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_names_that_a_format_does_not_take(tmp_path):
+    for style, cameras, message in (
+        ("colmap", {"left": PINHOLE}, "'left': .* give names like '1', '2'"),
+        ("kalibr", {"cam1": PINHOLE}, "calls its cameras cam0, cam1, ... in this order, not cam1"),
+        ("opencv", {"a": PINHOLE, "b": PINHOLE}, "holds one camera per file, not 2"),
+        ("nerfstudio", {"a": PINHOLE, "b": FISHEYE}, "of one model, not KannalaBrandt, Pinhole"),
+        ("nerfstudio", {}, "give a camera, or a dictionary"),
+        ("magic", {"a": PINHOLE}, "format='magic': allowed are colmap, opencv"),
+        (None, {"a": PINHOLE}, "give the format to write"),
+    ):
+        with pytest.raises(mp.InputError, match=message):
+            mp.write_calibration(tmp_path / "file.yaml", cameras, style)
+    assert not any(tmp_path.iterdir())
+
+
+def test_files_that_are_not_calibrations(tmp_path):
+    (tmp_path / "notes.txt").write_text("hello world, these are notes\n")
+    (tmp_path / "image.yaml").write_bytes(b"\xff\xfe\x00")
+    for name, message in (
+        ("notes.txt", "not recognized as a calibration of colmap, opencv, kalibr, nerfstudio: give its format"),
+        ("image.yaml", "is not text"),
+        ("none.yaml", "cannot be read: No such file"),
+        (".", "cannot be read: Is a directory"),
+    ):
+        with pytest.raises(mp.InputError, match=message):
+            mp.read_calibration(tmp_path / name)
+    with pytest.raises(mp.InputError, match="cannot be read: embedded null"):
+        mp.read_calibration("a\0b")
