@@ -151,3 +151,12 @@ def test_a_triangle_through_the_eye_may_be_anywhere():
     assert box.valid
     assert (box.low <= 0.01).all()
     assert (box.high >= 63.9).all()
+
+
+def test_tiny_triangles_have_tiny_boxes():
+    camera = mp.Radial.paraboloid(512, 512)
+    corners = np.array([[0.1, 0.1, 1], [0.1 + 1e-7, 0.1, 1], [0.1, 0.1 + 1e-7, 1]])
+    box = camera.bound(corners)
+    assert box.valid
+    assert (box.high - box.low < 0.01).all()
+    assert not camera.bound(corners * [1, 1, -1]).valid

@@ -1,6 +1,8 @@
 """What each camera model promises: exact rays and projections, domains, gradients, one answer from three libraries."""
 
+import copy
 import dataclasses
+import pickle
 
 import drjit.llvm as types
 import jax
@@ -298,3 +300,11 @@ def test_convexity_is_recognized():
     assert not mp.custom_profile(lambda theta: theta**0.5, np.pi / 2).convex
     assert not mp.custom_profile(lambda theta: theta**1.5, np.pi / 2).convex
     assert not mp.custom_profile(lambda theta: theta + theta**3, np.pi / 2).convex
+
+
+def test_pickled_and_copied_cameras_are_equal(camera):
+    if getattr(getattr(camera, "profile", None), "name", "") == "custom":
+        return  # a lambda of this file
+    for again in (pickle.loads(pickle.dumps(camera)), copy.deepcopy(camera)):
+        assert again == camera
+        assert camera_to_json(again) == camera_to_json(camera)

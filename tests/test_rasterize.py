@@ -1,6 +1,7 @@
 """First hits: against Embree, against brute force in float64, and against what each method promises."""
 
 import gc
+import threading
 import weakref
 
 import numpy as np
@@ -264,7 +265,7 @@ def test_one_pixel(method):
         (lambda c, m: mp.rasterize(mp.Orthographic(8, 8), m, method="cubemap"), "one centre, not Orthographic"),
         (lambda c, m: mp.rasterize(mp.Radial.equidistant(8, 8, fov=4.0), m, method="hemicube"), "use method='cubemap'"),
         (lambda c, m: mp.rasterize("camera", m), "camera is a str"),
-        (lambda c, m: mp.rasterize(c, "mesh"), "mpcam.Mesh is needed, got str"),
+        (lambda c, m: mp.rasterize(c, "mesh"), "a str is not a scene: give a Scene, a Mesh"),
         (lambda c, m: mp.shade(mp.rasterize(c, m), m, "toon"), "allowed are color, normal, texture, light"),
         (lambda c, m: mp.shade(mp.rasterize(c, m), mp.builtin_mesh("sphere")), "give the scene that was rasterized"),
         (lambda c, m: mp.interpolate(mp.rasterize(c, m), np.zeros((2, 2))), "per vertex or"),
@@ -275,3 +276,78 @@ def test_mistakes_are_named(call, words):
     with pytest.raises(mp.InputError, match=words) as caught:
         call(mp.Radial.paraboloid(8, 8), mp.builtin_mesh("cube"))
     assert "\n" not in str(caught.value)
+
+
+def test_an_image_of_more_blocks_than_the_pair_budget():
+    """One triangle over all of an image whose blocks exceed the budget of pairs."""
+    mesh = mp.Mesh([[-9, -9, 1], [9, -9, 1], [0, 19, 1]], [[0, 1, 2]])
+    hits = mp.rasterize(mp.Pinhole(4200, 4130), mesh)
+    assert hits.mask.all()
+
+
+@pytest.mark.parametrize("far", [1e3, 1e6, 1e12])
+def test_vertices_that_no_face_uses_do_not_matter(far):
+    mesh = mp.builtin_mesh("sphere", triangles=80)
+    camera = mp.Radial.paraboloid(64, 64, mp.look_at((0, -1.25, 0), (0, 0, 0)))
+    with_far = mp.Mesh(np.vstack([mesh.vertices, [[far, far, far]]]), mesh.faces)
+    assert np.array_equal(mp.rasterize(camera, with_far).depth, mp.rasterize(camera, mesh).depth)
+
+
+def test_threads_take_turns():
+    mesh, camera = mp.builtin_mesh("sphere", triangles=1280), mp.Radial.paraboloid(48, 48)
+    expected = mp.rasterize(camera, mesh).depth
+    found, failed = [], []
+
+    def work(fov):
+        try:
+            for _ in range(4):
+                found.append(np.array_equal(mp.rasterize(camera, mesh).depth, expected))
+                _ = mp.rasterize(mp.Radial.equidistant(48, 48, fov=fov), mesh).barycentric
+        except Exception as error:  # noqa: BLE001
+            failed.append(error)
+
+    threads = [threading.Thread(target=work, args=(1 + 0.1 * k,)) for k in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not failed
+    assert found == [True] * 24
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_updates_are_checked(method):
+    prepared = mp.prepare(mp.Radial.paraboloid(16, 16), mp.builtin_mesh("cube"), method)
+    for wrong in (np.zeros((1, 3)), np.zeros((3, 8)), "x", None):
+        with pytest.raises(mp.InputError, match="vertices (have shape|are a)"):
+            prepared.update(wrong)
+
+
+@pytest.mark.parametrize("method", ["invert", "raytrace"])
+def test_vertices_may_become_and_stop_being_nan(method):
+    corners = np.array([[-1, -1, 1], [1, -1, 1], [0, 1, 1], [-1, -1, 2], [1, -1, 2], [0, 1, 2.0]])
+    mesh = mp.Mesh(corners, [[0, 1, 2], [3, 4, 5]])
+    camera = mp.Radial.paraboloid(32, 32)
+    prepared = mp.prepare(camera, mesh, method)
+    whole = prepared.frame().triangle
+    broken = corners.copy()
+    broken[1] = np.nan
+    prepared.update(broken)
+    assert set(np.unique(prepared.frame().triangle)) == {-1, 1}
+    prepared.update(corners)
+    assert np.array_equal(prepared.frame().triangle, whole)
+
+
+def test_several_meshes_and_the_default_bound_everywhere():
+    camera, meshes = mp.Radial.paraboloid(16, 16), [mp.builtin_mesh("cube"), mp.builtin_mesh("sphere")]
+    for method in METHODS:
+        assert mp.rasterize(camera, meshes, method=method, bound="tight").mask.any()
+
+
+def test_a_camera_with_jax_numbers_is_rasterized():
+    import jax.numpy as jnp
+
+    camera = mp.Radial.paraboloid(32, 32, fov=jnp.float32(3.0))
+    plain = mp.Radial.paraboloid(32, 32, fov=float(np.float32(3.0)))
+    mesh = mp.builtin_mesh("sphere")
+    assert np.array_equal(mp.rasterize(camera, mesh).depth, mp.rasterize(plain, mesh).depth)

@@ -22,6 +22,7 @@ from mpcam_kernels.samples import BLOCK, Samples, blocks, place
 SMALL = 48  # pixels in a rectangle that one lane walks by itself
 PER_LANE = 4  # pixels of a lane in the pass over blocks: 16 lanes share a block, and gather a triangle for 64 tests
 PAIRS = 1 << 18  # triangle-block pairs held at a time; a scene with more is processed in chunks
+LANES = 1 << 22  # of those that look for pairs, at a time
 EMPTY = 0xFFFFFFFFFFFFFFFF
 
 
@@ -85,11 +86,12 @@ class Pipeline:
         buffer, large, counters = self._triangles(triangles, camera, positions, faces, samples, counters, lists, rows)
         if done:
             done("triangles", (buffer, large))
-        total = large.count[0]
-        start, chunk = 0, total
+        # Lanes are a large triangle and a row of blocks each: the pairs of one row always fit.
+        total = large.count[0] * self.block_rows
+        start, chunk = 0, min(total, LANES)
         while start < total:
             chunk = min(chunk, total - start)
-            lanes = self._lanes(start * self.block_rows, (start + chunk) * self.block_rows)
+            lanes = self._lanes(start, start + chunk)
             pairs, found, counts = self._pairs(lanes, samples, large)
             needed = found[0]
             if needed > PAIRS and chunk > 1:

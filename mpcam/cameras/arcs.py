@@ -227,13 +227,14 @@ def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box
         through_eye = through_eye | (dot(corners[p], corners[q]) < -1 + 1e-6) | (dot(corners[p], corners[p]) < 0.5)
     normals = [cross(corners[(i + 1) % 3], corners[(i + 2) % 3]) for i in range(3)]
     facing = where(dot(corners[0], normals[0]) < 0, -1.0, 1.0)
+    area = norm(normals[0]) + norm(normals[1]) + norm(normals[2]) > 0
     z, side = cos(0.5 * camera.fov + 0.0 * facing), sin(0.5 * camera.fov + 0.0 * facing)
     centre = (camera.cx, camera.cy)
     for i in (0, 1):
         for sign in (-1, 1):
             rim = vector(sign * side * (1 - i), sign * side * i, z)
-            edges = [facing * dot(normal, rim) for normal in normals]
-            inside = minimum(minimum(edges[0], edges[1]), edges[2]) >= -1e-6
+            edges = [facing * dot(normal, rim) + 1e-6 * norm(normal) for normal in normals]
+            inside = area & (minimum(minimum(edges[0], edges[1]), edges[2]) >= 0)
             valid = valid | inside
             if sign > 0:
                 high[i] = maximum(high[i], where(inside, centre[i] + camera.radius, -_FAR))

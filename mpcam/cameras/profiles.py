@@ -7,6 +7,7 @@ sqrt(1 - cos theta) = sqrt(2) sin(theta / 2).
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,12 @@ class Profile:
     limit: float
     limit_included: bool
     convex: bool
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Built-in profiles are pickled and copied by name: their functions are lambdas, and there is one of each."""
+        if PROFILES.get(self.name) is self:
+            return _built_in, (self.name,)
+        return super().__reduce_ex__(protocol)
 
     @property
     def reach(self) -> float:
@@ -95,6 +102,10 @@ EQUIDISTANT = Profile(
 """r = 2 theta / pi: distance from the centre is proportional to the angle."""
 
 PROFILES = {profile.name: profile for profile in (PARABOLOID, COSINE_SPHERE, EQUISOLID, EQUIDISTANT)}
+
+
+def _built_in(name: str) -> Profile:
+    return PROFILES[name]
 
 
 def custom_profile(

@@ -11,6 +11,7 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
+from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
 
 MOST_PIXELS = 32767  # along a side: kernels keep two pixel numbers in 32 bits
@@ -70,6 +71,7 @@ class Buffered:
     method: ClassVar[str]
     bound: str = "tight"
 
+    @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
         if max(camera.width, camera.height) > MOST_PIXELS:
             size = f"{camera.width}x{camera.height}"
@@ -82,6 +84,7 @@ class Buffered:
         self.pose = self.device.pose(camera)
         self.unit = opaque_numbers([self.device.scale])[0]
 
+    @exclusive
     def update(self, vertices: np.ndarray) -> None:
         """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
         self.vertices = self.device.place(np.asarray(vertices))
@@ -106,6 +109,7 @@ class Buffered:
             done("vertices", positions)
         return positions, self._run(positions, done, count=False)[0]
 
+    @exclusive
     def count(self, positions: Any) -> np.ndarray:
         """Tests and covered samples of a frame over placed vertices."""
         return self._run(positions, None, count=True)[1].numpy()
@@ -121,10 +125,12 @@ class Buffered:
         kernels = _pipeline(self.test, self.bound, model, static, *size, count, backend_name())
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
+    @exclusive
     def frame(self) -> Hits:
         """One frame, evaluated: triangle and depth of every pixel."""
         return self._hits(*self.buffer())
 
+    @exclusive
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()

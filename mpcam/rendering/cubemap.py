@@ -12,6 +12,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import lens, opaque_numbers, types
+from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.invert import Inverted
 
@@ -52,6 +53,7 @@ class Cubemapped:
     method = "cubemap"
     half = False
 
+    @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
         if (
             isinstance(resolution, bool)
@@ -71,16 +73,19 @@ class Cubemapped:
         self.lens = lens(camera)
         self.unit = opaque_numbers([self.faces[0].device.scale])[0]
 
+    @exclusive
     def update(self, vertices: np.ndarray) -> None:
         """New positions (V, 3) of the vertices."""
         self.faces[0].update(vertices)
         for face in self.faces[1:]:
             face.vertices = self.faces[0].vertices
 
+    @exclusive
     def frame(self) -> Hits:
         """One frame, evaluated."""
         return self._hits([face.buffer() for face in self.faces])
 
+    @exclusive
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()

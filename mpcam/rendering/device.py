@@ -34,7 +34,10 @@ class DeviceMesh:
 
     def __init__(self, mesh: Mesh):
         t = types()
-        low, high = mesh.bounds
+        used = mesh.corners.reshape(-1, 3)  # vertices that no face uses must not widen the range
+        used = used[np.isfinite(used).all(axis=1)]
+        low, high = (used.min(0), used.max(0)) if len(used) else (np.zeros(3), np.zeros(3))
+        self.shape = mesh.vertices.shape
         extent = float(np.max(high - low)) / 2
         self.anchor = 0.5 * low + 0.5 * high
         self.scale = extent if extent > 0 else 1.0
@@ -42,7 +45,13 @@ class DeviceMesh:
         self.vertices = self.place(mesh.vertices)
 
     def place(self, vertices: np.ndarray) -> Any:
-        """Other positions of the same vertices, uploaded."""
+        """Other positions of the same vertices, uploaded; raises InputError unless there are as many of them."""
+        try:
+            vertices = np.asarray(vertices, np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"vertices are a {type(vertices).__name__}: give numbers of shape {self.shape}") from None
+        if vertices.shape != self.shape:
+            raise InputError(f"vertices have shape {vertices.shape}: give {self.shape}, as the mesh has")
         with np.errstate(invalid="ignore", over="ignore"):
             flat = ((vertices - self.anchor) / self.scale).astype(np.float32).ravel()
         if flat.size == 0:
@@ -95,7 +104,13 @@ def device_mesh(mesh: Mesh) -> DeviceMesh:
 def lens_key(camera: Camera) -> tuple[Any, ...]:
     """What decides a camera's rays in its own frame: everything but the pose."""
     names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
-    return (type(camera), *(getattr(camera, name) for name in names if name != "camera_from_world"))
+    values = ((name, getattr(camera, name)) for name in names if name != "camera_from_world")
+    return (type(camera), *(v if name in camera.static_fields else _plain(v) for name, v in values))
+
+
+def _plain(value: Any) -> Any:
+    """A number of any library, or a tuple of them, as Python floats: hashable, and the same for the same number."""
+    return tuple(_plain(v) for v in value) if isinstance(value, tuple) else float(value)
 
 
 def device_lens(camera: Camera) -> Camera:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.geometry.mesh import Mesh
+from mpcam.rendering.exclusive import exclusive
 
 
 @dataclass(frozen=True)
@@ -52,26 +53,31 @@ class Hits:
         self._weights, self._stats = weights, stats
 
     @cached_property
+    @exclusive
     def device_weights(self) -> tuple[Any, Any]:
         """Barycentric weights of corners 2 and 3 on the device, one number per pixel."""
         return self._weights()
 
     @cached_property
+    @exclusive
     def triangle(self) -> np.ndarray:
         """(H, W) int32, -1 where nothing is hit."""
         return self._image(self.device_triangle)
 
     @cached_property
+    @exclusive
     def depth(self) -> np.ndarray:
         """(H, W) float32, infinite where nothing is hit."""
         return self._image(self.device_depth)
 
     @cached_property
+    @exclusive
     def barycentric(self) -> np.ndarray:
         """(H, W, 2) float32, weights of the second and third corner."""
         return np.stack([self._image(weight) for weight in self.device_weights], -1)
 
     @cached_property
+    @exclusive
     def stats(self) -> Stats:
         """Work counts; counted in a second run when they are asked for. Zero for methods that test no pixels."""
         return self._stats()

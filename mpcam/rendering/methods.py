@@ -41,12 +41,14 @@ def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settin
         raise InputError(
             f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid"
         )
-    if isinstance(mesh, Scene):
-        mesh = mesh.mesh
+    if not isinstance(mesh, Mesh):
+        mesh = Scene.of(mesh).mesh
     kinds = {"invert": ("bound",), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
         raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
     allowed = kinds.get(method, ())
+    if "bound" not in allowed and settings.get("bound") == "tight":  # the default is nothing to complain of
+        settings = {name: value for name, value in settings.items() if name != "bound"}
     for name in settings:
         if name not in allowed:
             raise InputError(f"method={method!r} has no setting {name!r}: allowed are {', '.join(allowed) or 'none'}")

@@ -10,6 +10,7 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
 from mpcam.rendering.device import lens, opaque_numbers, types
+from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits
 
 SHADINGS = ("color", "normal", "texture", "light")
@@ -83,6 +84,7 @@ def attributes(mesh: Mesh) -> Attributes:
     return found
 
 
+@exclusive
 def shade(hits: Hits, scene: Any = None, shading: str = "light") -> np.ndarray:
     """Colours of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
 
@@ -103,6 +105,7 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light") -> np.ndarray:
     return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
 
 
+@exclusive
 def shade_device(hits: Hits, scene: Scene, shading: str = "light") -> Any:
     """As `shade`, but the colours stay on the device: an evaluated Array3f, one entry per pixel."""
     import drjit as dr

@@ -10,6 +10,7 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
 from mpcam.rendering.device import flat, to_camera, types
+from mpcam.rendering.exclusive import exclusive
 
 MOST_LEVELS = 7
 MOST_TRIANGLES = 1 << 26
@@ -25,6 +26,7 @@ class VertexProjected(Buffered):
 
     method = "vertex"
 
+    @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, level: int = 0):
         if isinstance(level, bool) or not isinstance(level, (int, np.integer)) or not 0 <= level <= MOST_LEVELS:
             raise InputError(
@@ -100,6 +102,7 @@ class Parts:
     grid: weights of corners 2 and 3 at the grid points. count: parts per triangle. points: grid points per triangle.
     """
 
+    @exclusive
     def __init__(self, divisions: int):
         rows = [(row, column) for row in range(divisions + 1) for column in range(row + 1)]
         number = {place: count for count, place in enumerate(rows)}

@@ -8,6 +8,7 @@ from mpcam.cameras.base import Camera
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
+from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.truth.meshes import mitsuba_mesh, move, position_key
 from mpcam.truth.variant import mitsuba
@@ -22,16 +23,12 @@ class RayTraced:
 
     method = "raytrace"
 
+    @exclusive
     def __init__(self, camera: Camera, mesh: Mesh):
         import drjit as dr
 
         self.camera, self.mesh = camera, mesh
         self.device: DeviceMesh = device_mesh(mesh)
-        with np.errstate(invalid="ignore", over="ignore"):
-            finite = np.isfinite(mesh.corners).all(axis=(1, 2))
-        self._kept = None if finite.all() else types().UInt(np.flatnonzero(finite).astype(np.uint32))
-        faces = mesh.faces if self._kept is None else mesh.faces[finite]
-        self._empty = len(faces) == 0
         with mitsuba() as mi:
             origin, direction, valid = lens(camera).ray
             pose = self.device.pose(camera)
@@ -43,25 +40,38 @@ class RayTraced:
             self._ray = mi.Ray3f(mi.Point3f(*world), mi.Vector3f(*along))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
-            self._scene: Any = None
-            self._parameters: Any = None
-            if not self._empty:
-                positions = dr.select(dr.isfinite(self.device.vertices), self.device.vertices, 0.0)
-                shape = mitsuba_mesh(mi, "mesh", positions, faces)
-                self._scene = mi.load_dict({"type": "scene", "mesh": shape})
-                self._parameters = mi.traverse(self._scene)
-                self._key = position_key(self._parameters)
+        self._build(mesh.vertices)
 
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the vertices: uploads them and rebuilds the tree."""
+    def _build(self, vertices: np.ndarray) -> None:
+        """A scene of the faces whose corners are finite."""
         import drjit as dr
 
-        if self._empty:
+        with np.errstate(invalid="ignore", over="ignore"):
+            finite = np.isfinite(vertices[self.mesh.faces]).all(axis=(1, 2))
+        self._kept = None if finite.all() else types().UInt(np.flatnonzero(finite).astype(np.uint32))
+        faces = self.mesh.faces if self._kept is None else self.mesh.faces[finite]
+        self._scene: Any = None
+        self._parameters: Any = None
+        if len(faces) == 0:
+            return
+        positions = self.device.place(vertices)
+        with mitsuba() as mi:
+            shape = mitsuba_mesh(mi, "mesh", dr.select(dr.isfinite(positions), positions, 0.0), faces)
+            self._scene = mi.load_dict({"type": "scene", "mesh": shape})
+            self._parameters = mi.traverse(self._scene)
+            self._key = position_key(self._parameters)
+
+    @exclusive
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the vertices: uploads them and rebuilds the tree."""
+        positions = self.device.place(vertices)
+        if self._scene is None or self._kept is not None or not np.isfinite(vertices).all():
+            self._build(np.asarray(vertices, np.float64))  # other faces may be finite now
             return
         with mitsuba() as mi:
-            positions = self.device.place(np.asarray(vertices))
-            move(self._parameters, self._key, mi.Float(dr.select(dr.isfinite(positions), positions, 0.0)))
+            move(self._parameters, self._key, mi.Float(positions))
 
+    @exclusive
     def frame(self) -> Hits:
         """One frame, evaluated."""
         import drjit as dr
@@ -85,6 +95,7 @@ class RayTraced:
             del mi
         return Hits(self.camera, self.mesh, self.method, triangle, depth, lambda: (second, third), lambda: Stats(0, 0))
 
+    @exclusive
     def stages(self) -> dict[str, float]:
         """Seconds of rebuilding the tree over the present positions, and of tracing."""
         if self._scene is None:
