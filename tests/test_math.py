@@ -74,3 +74,30 @@ def test_root_of_a_function_that_newton_alone_would_miss():
     value = np.arctan(50 * (np.linspace(0, 1, 21) - 0.9))
     found = m.invert_increasing(lambda x: m.atan(50 * (x - 0.9)), steep, value, 0.0, 1.0)
     assert np.abs(found - np.linspace(0, 1, 21)).max() < 1e-9
+
+
+@pytest.mark.parametrize("power", [2, 5, 9])
+def test_inverse_is_exact_where_newton_creeps_and_does_not_leave_the_root_again(power):
+    """x + 50 x^power over eight decades: Newton's steps shrink slowly at first, and not at all in the last place."""
+    x = np.pi * 10 ** np.linspace(-8, 0, 4001)
+    value = x + 50 * x**power
+    found = m.invert_increasing(
+        lambda x: x + 50 * x**power, lambda x: 1 + 50 * power * x ** (power - 1), value, 0.0, float(np.pi)
+    )
+    assert (np.abs(found - x) < 1e-14 * x).all()
+
+
+def test_sign_changes_of_a_polynomial():
+    """Also of roots that nearly coincide, and of none where a minimum stays above zero."""
+    found = m.sign_changes(list(np.polynomial.polynomial.polyfromroots([0.5, 1.0, 1.0 + 1e-6, 3.0])), 0.0, 2.0)
+    assert np.allclose(found, [0.5, 1, 1 + 1e-6], atol=1e-9)
+    assert m.sign_changes([1.0 + 1e-9, -2.0, 1.0], 0.0, 2.0) == []
+    assert m.sign_changes([2.0], 0.0, 2.0) == []
+    assert m.polynomial([1.0, 2.0, 3.0], 2.0) == 17
+
+
+def test_guarded_root_has_no_infinite_derivative():
+    x = np.array([-1.0, 0.0, 4.0])
+    assert m.safe_sqrt(x).tolist() == [0, 0, 2]
+    assert jax.vmap(jax.grad(m.safe_sqrt))(jnp.asarray(x)).tolist() == [0, 0, 0.25]
+    assert isinstance(m.where(x[0] < 0, 1.0, 2.0), float)

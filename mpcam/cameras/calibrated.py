@@ -43,7 +43,7 @@ class _View:
 class Calibrated:
     """Rays, images and boxes from the functions r = f(theta), f' and the inverse that a model supplies.
 
-    derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
+    Derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
     edge, an angle beyond which nothing lands in the image; convex, whether images of straight lines bulge away from the
     centre up to there (see `Profile`). They are None and False in cameras whose parameters are traced by JAX.
     """

@@ -12,6 +12,7 @@ from mpcam.errors import InputError
 from mpcam.math import PI, Array, detach, invert_increasing, library, minimum, polynomial, sign_changes
 
 _NODES = 4096
+_LARGEST = 1e6  # of a coefficient; lenses have less than 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -74,17 +75,13 @@ class KannalaBrandt(Calibrated, Camera):
 def _four(k: Any) -> tuple[Array, ...]:
     """k as a tuple of four Python floats, or of four arrays of another library."""
     try:
-        values = tuple(k)
-    except TypeError:
+        values = tuple(float(value) if library(value) == "numpy" else value for value in k)
+    except (TypeError, ValueError):
         raise InputError(f"KannalaBrandt(k={k!r}): four numbers k1, k2, k3, k4 are needed") from None
     if len(values) != 4:
         raise InputError(f"KannalaBrandt(k={k!r}): four numbers k1, k2, k3, k4 are needed, not {len(values)}")
-    try:
-        values = tuple(float(value) if library(value) == "numpy" else value for value in values)
-    except (TypeError, ValueError):
-        raise InputError(f"KannalaBrandt(k={k!r}): four finite numbers are needed") from None
-    if not all(library(value) != "numpy" or abs(value) < 1e30 for value in values):
-        raise InputError(f"KannalaBrandt(k={k!r}): four finite numbers are needed")
+    if not all(library(value) != "numpy" or abs(value) <= _LARGEST for value in values):
+        raise InputError(f"KannalaBrandt(k={k!r}): four numbers between {-_LARGEST:g} and {_LARGEST:g} are needed")
     return values
 
 

@@ -45,7 +45,8 @@ class Domain(NamedTuple):
     """Where a camera is defined.
 
     max_angle: largest angle between the optical axis and a ray, radians; None where rays have no common centre.
-    image_radius: radius of the image circle around `center`, pixels; None where the image is not a disc.
+    image_radius: radius in pixels of the image circle around the camera's (cx, cy), or the larger one of an ellipse;
+    None where the image goes on to infinity.
     """
 
     max_angle: float | None

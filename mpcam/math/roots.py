@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from mpcam.math.arrays import Array, absolute, detach, library, where
+from mpcam.math.arrays import Array, absolute, detach, epsilon, library, where
 
 _STEPS = 40
 
@@ -13,13 +13,14 @@ def invert_increasing(
 ) -> Array:
     """x in [low, high] with function(x) = value, for an increasing function.
 
-    Newton's step where it stays inside the bracket and is less than half the step before, bisection otherwise. Values
+    Newton's step where it stays inside the bracket and is at most half the step before, bisection otherwise. Values
     beyond the ends give the nearer end. The derivative comes from the implicit-function theorem (one Newton step on
     detached arguments), never from the iterations.
     """
     target = detach(value)
     zero = 0.0 * (function(target * 0.0 + low) - target)  # of the type that the result has
     below, above = zero + low, zero + high
+    last_places = 4 * epsilon(below) * (above - below)  # at the root Newton's steps do not shrink any more
 
     def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
         below, above, x, step_before = state
@@ -28,8 +29,8 @@ def invert_increasing(
         above = where(residual > 0, x, above)
         gradient = slope(x)
         newton = x - residual / where(gradient > 0, gradient, 1.0)
-        usable = (gradient > 0) & (newton > below) & (newton < above)
-        usable = usable & (absolute(newton - x) < 0.5 * step_before)
+        usable = (gradient > 0) & (newton >= below) & (newton <= above)
+        usable = usable & (absolute(newton - x) <= 0.5 * step_before + last_places)
         after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
         return below, above, after, absolute(after - x)
 
