@@ -12,7 +12,7 @@ import numpy as np
 
 from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_quick
 from mpcam.cameras.profiles import Profile, bulges_outward
-from mpcam.cameras.symmetric import finite_pixel, finite_point, symmetric_image, symmetric_ray
+from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, detach, epsilon, library, maximum, minimum, vector, where
@@ -141,11 +141,7 @@ class Calibrated:
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
         """Image of a point in the camera frame; valid in the domain, not at the camera's centre."""
-        point, depth, valid = finite_point(point)
-        image, inside = self.local_image(point)
-        valid = valid & inside
-        pixel = vector(where(valid, image[0], self.cx), where(valid, image[1], self.cy))
-        return (Projection(pixel, depth, valid),)
+        return (project_centred(self, point),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, and whether it lies in the domain; beyond it, the pixel is on its rim."""

@@ -8,10 +8,10 @@ from mpcam.cameras.arcs import radial_bound, radial_bound_quick
 from mpcam.cameras.base import Camera
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
-from mpcam.cameras.symmetric import finite_pixel, finite_point, symmetric_image, symmetric_ray
+from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
-from mpcam.math import PI, Array, Vector, epsilon, library, vector, where
+from mpcam.math import PI, Array, Vector, epsilon, library, vector
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -123,11 +123,7 @@ class Radial(Camera):
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
         """Image of a point in the camera frame; valid up to the rim, not at the camera's centre."""
-        point, depth, valid = finite_point(point)
-        image, inside = self.local_image(point)
-        valid = valid & inside
-        pixel = vector(where(valid, image[0], self.cx), where(valid, image[1], self.cy))
-        return (Projection(pixel, depth, valid),)
+        return (project_centred(self, point),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, also beyond the rim as far as f goes on, and whether it lies within the field of view."""

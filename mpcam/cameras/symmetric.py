@@ -3,8 +3,10 @@
 Everything here is in the units of the profile; cameras shift and scale it to pixels.
 """
 
+from typing import Protocol
+
 from mpcam.cameras.profiles import Profile
-from mpcam.cameras.types import Ray
+from mpcam.cameras.types import Projection, Ray
 from mpcam.math import (
     Array,
     Vector,
@@ -72,10 +74,22 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
     return ratio * x + behind, ratio * y, theta
 
 
-def finite_point(point: Vector) -> tuple[Vector, Array, Array]:
-    """The point, or the camera's centre if it is not finite; its distance; and whether it is finite and off centre."""
+class CentredCamera(Protocol):
+    """A camera that gives the pixel of a finite point, and knows the pixel of its axis."""
+
+    @property
+    def cx(self) -> Array: ...
+    @property
+    def cy(self) -> Array: ...
+    def local_image(self, point: Vector) -> tuple[Vector, Array]: ...
+
+
+def project_centred(camera: CentredCamera, point: Vector) -> Projection:
+    """Image of a point in the camera frame; not valid outside of the domain, nor at the camera's centre."""
     x, y, z = point
     finite = isfinite(x) & isfinite(y) & isfinite(z)
     point = vector(where(finite, x, 0.0), where(finite, y, 0.0), where(finite, z, 0.0))
     depth = norm(point)
-    return point, depth, finite & (depth > 0)
+    image, inside = camera.local_image(point)
+    valid = finite & (depth > 0) & inside
+    return Projection(vector(where(valid, image[0], camera.cx), where(valid, image[1], camera.cy)), depth, valid)
