@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from mpcam.io.scenes import load_scene as load_scene
     from mpcam.rendering.hits import Hits as Hits
     from mpcam.rendering.interpolate import interpolate as interpolate
+    from mpcam.rendering.maps import CoverageMap as CoverageMap
+    from mpcam.rendering.maps import DepthMap as DepthMap
+    from mpcam.rendering.maps import coverage_map as coverage_map
+    from mpcam.rendering.maps import depth_map as depth_map
     from mpcam.rendering.methods import prepare as prepare
     from mpcam.rendering.methods import rasterize as rasterize
     from mpcam.rendering.methods import render as render
@@ -66,6 +70,7 @@ _HOMES = {
     "mpcam.io.scenes": "load_scene",
     "mpcam.rendering.hits": "Hits",
     "mpcam.rendering.interpolate": "interpolate",
+    "mpcam.rendering.maps": "CoverageMap DepthMap coverage_map depth_map",
     "mpcam.rendering.methods": "prepare rasterize render",
     "mpcam.rendering.shade": "shade",
 }

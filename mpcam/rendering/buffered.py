@@ -13,6 +13,7 @@ from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.maps import CoverageMap, DepthMap
 
 MOST_PIXELS = 32767  # along a side: kernels keep two pixel numbers in 32 bits
 
@@ -70,6 +71,7 @@ class Buffered:
 
     method: ClassVar[str]
     bound: str = "tight"
+    output: str = "hits"
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
@@ -126,9 +128,18 @@ class Buffered:
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
     @exclusive
-    def frame(self) -> Hits:
-        """One frame, evaluated: triangle and depth of every pixel."""
-        return self._hits(*self.buffer())
+    def frame(self) -> Any:
+        """One frame, evaluated: Hits, DepthMap or CoverageMap."""
+        hits = self._hits(*self.buffer())
+        if self.output == "depth":
+            return DepthMap(self.camera, hits.device_depth)
+        if self.output == "coverage":
+            import drjit as dr
+
+            mask = hits.device_triangle >= 0
+            dr.eval(mask)
+            return CoverageMap(self.camera, mask, self.lens.ray.valid)
+        return hits
 
     @exclusive
     def stages(self) -> dict[str, float]:

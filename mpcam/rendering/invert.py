@@ -23,7 +23,7 @@ class Inverted(Buffered):
 
     method = "invert"
 
-    def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight"):
+    def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits"):
         if bound not in BOUNDS:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
         if bound == "quad" and not hasattr(camera, "local_bound_quads"):
@@ -31,7 +31,7 @@ class Inverted(Buffered):
                 f"bound='quad' is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
             )
         super().__init__(camera, mesh, "central" if camera.central else "planar")
-        self.bound = bound
+        self.bound, self.output = bound, output
 
     def place(self, vertices: Any) -> Any:
         import drjit as dr

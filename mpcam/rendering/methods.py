@@ -9,6 +9,7 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.scene import Scene
 from mpcam.rendering.hits import Hits
+from mpcam.rendering.maps import OUTPUTS
 from mpcam.rendering.shade import shade
 
 METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
@@ -21,8 +22,8 @@ class Prepared(Protocol):
         """New positions (V, 3) of the mesh's vertices, world frame."""
         ...
 
-    def frame(self) -> Hits:
-        """One frame, evaluated on the device."""
+    def frame(self) -> Any:
+        """One frame, evaluated on the device: Hits, DepthMap or CoverageMap."""
         ...
 
     def stages(self) -> dict[str, float]:
@@ -30,12 +31,15 @@ class Prepared(Protocol):
         ...
 
 
-def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Prepared:
+def prepare(
+    camera: Camera, mesh: Mesh | Scene, method: str = "invert", *, output: str = "hits", **settings: Any
+) -> Prepared:
     """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
 
-    settings: `bound` ("tight" or "quad") for invert; `level` (0 to 7) for vertex; `resolution` (pixels per face) for
-    cubemap and hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where a method
-    cannot serve the camera.
+    output: what frames hold: "hits", or with method "invert" less and faster: "depth" (a DepthMap) or "coverage" (a
+    CoverageMap). settings: `bound` ("tight" or "quad") for invert; `level` (0 to 7) for vertex; `resolution` (pixels
+    per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where
+    a method cannot serve the camera.
     """
     if not isinstance(camera, Camera):
         raise InputError(
@@ -52,6 +56,12 @@ def prepare(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settin
     for name in settings:
         if name not in allowed:
             raise InputError(f"method={method!r} has no setting {name!r}: allowed are {', '.join(allowed) or 'none'}")
+    if output not in OUTPUTS:
+        raise InputError(f"output={output!r}: allowed are {', '.join(OUTPUTS)}")
+    if method == "invert":
+        settings = {**settings, "output": output}
+    elif output != "hits":
+        raise InputError(f"method={method!r} gives output='hits' only: use method='invert' for output={output!r}")
     return _kind(method)(camera, mesh, **settings)
 
 
