@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
+    from mpcam.effects.environment import EnvironmentMap as EnvironmentMap
+    from mpcam.effects.environment import environment_map as environment_map
+    from mpcam.effects.occlusion import ambient_occlusion as ambient_occlusion
+    from mpcam.effects.occlusion import form_factor as form_factor
+    from mpcam.effects.shadows import ShadowMap as ShadowMap
+    from mpcam.effects.shadows import shadow_map as shadow_map
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
     from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
@@ -60,6 +66,9 @@ _HOMES = {
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
+    "mpcam.effects.environment": "EnvironmentMap environment_map",
+    "mpcam.effects.occlusion": "ambient_occlusion form_factor",
+    "mpcam.effects.shadows": "ShadowMap shadow_map",
     "mpcam.errors": "InputError SetupError",
     "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
     "mpcam.geometry.load": "load_mesh",
@@ -75,7 +84,7 @@ _HOMES = {
     "mpcam.rendering.shade": "shade",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
-_SUBPACKAGES = ("cameras", "comparison", "geometry", "io", "math", "rendering", "stress", "truth")
+_SUBPACKAGES = ("cameras", "comparison", "effects", "geometry", "io", "math", "rendering", "stress", "truth")
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 

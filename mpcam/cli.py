@@ -130,6 +130,8 @@ def render(
     size: str | None = None,
     projection: str | None = None,
     shading: str = "light",
+    shadows: bool = False,
+    shadow_size: int | None = None,
     level: int | None = None,
     resolution: int | None = None,
 ) -> None:
@@ -142,25 +144,32 @@ def render(
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.
+        shadows: Let the scene's lights cast shadows, by a shadow map each.
+        shadow_size: Pixels along a side of those; 1024 if not given.
         level: Times that --method vertex halves each edge.
         resolution: Pixels along a face of --method cubemap and hemicube.
     """
     from rich.console import Console
 
     from mpcam.cameras.change import projected
+    from mpcam.effects.shadows import shadow_maps
     from mpcam.io.image_formats import format_of
     from mpcam.io.images import write_image
     from mpcam.rendering.methods import rasterize
     from mpcam.rendering.shade import shade
 
     layers = format_of(output).layers
+    if shadow_size is not None and not shadows:
+        raise InputError(f"--shadow-size {shadow_size} goes with --shadows: give that too")
     _check_machine()
     loaded = _load(scene, size).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
     settings = {name: n for name, n in (("level", level), ("resolution", resolution)) if n is not None}
     with Console(stderr=True).status(f"rendering {loaded.name}"):
+        texels = 1024 if shadow_size is None else shadow_size
+        maps = shadow_maps(loaded, texels, shading) if shadows else ()
         hits = rasterize(camera, loaded.mesh, method=method, **settings)
-        image = shade(hits, loaded, shading)
+        image = shade(hits, loaded, shading, maps)
         write_image(output, image, **({"depth": hits.depth, "camera": camera} if layers else {}))
 
 
@@ -218,6 +227,54 @@ def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json
     else:
         report.print_cases(cases, chosen.LIMIT, Console(width=None if sys.stdout.isatty() else 110))
     return 0 if all(case.good(chosen.LIMIT) for case in cases) else EXIT_FAILURE
+
+
+@app.command
+def experiment(
+    name: str | None = None,
+    /,
+    *,
+    output: Path | None = None,
+    repeats: int | None = None,
+    quick: bool = False,
+    json: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Run an experiment of the papers again: tables, plots and a page. Without a name, list the experiments.
+
+    Args:
+        name: What to run.
+        output: Folder for the page, the plots and the numbers; out/NAME if not given.
+        repeats: Timed rounds, in place of the experiment's own number.
+        quick: Small scenes and few rounds, to see that it works; the figures mean little.
+        json: Print the numbers as JSON.
+        quiet: Print nothing but mistakes.
+    """
+    from rich.console import Console
+
+    from mpcam.comparison.progress import bar
+    from mpcam.experiments import EXPERIMENTS, run
+    from mpcam.experiments.terminal import WIDTH, print_experiments, print_report
+
+    console = Console(quiet=quiet or json, width=None if sys.stdout.isatty() else WIDTH)
+    if name is None:
+        if output or repeats or quick:
+            raise InputError(f"experiment: say which, one of {', '.join(EXPERIMENTS)}")
+        print_experiments(console)
+        if json:
+            _print_json([{"name": known.name, "summary": known.summary} for known in EXPERIMENTS.values()])
+        return
+    if name not in EXPERIMENTS:
+        raise InputError(f"experiment {name!r}: allowed are {', '.join(EXPERIMENTS)}")
+    _check_machine()
+    folder = output or Path("out") / name
+    with bar(Console(stderr=True, quiet=quiet), name) as progress:
+        report = run(name, repeats=repeats, quick=quick, output=folder, progress=progress)
+    if json:
+        _print_json(report.to_dict())
+        return
+    print_report(report, console)
+    console.print(f"Report: {folder / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
 
 
 @app.command

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpcam as mp
+from mpcam.cameras.outline import outline
 
 STEPS = 40
 _ROWS = np.array([(i, j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]) / STEPS
@@ -40,26 +41,56 @@ def test_boxes_hold_every_sampled_point(camera):
     assert_holds(camera.bound(corners), low, high, seen, 1e-9)
 
 
-def test_quick_boxes_hold_every_sampled_point(camera):
-    quick = getattr(camera, "local_bound_quick", None)
-    if quick is None:
-        assert not isinstance(camera, mp.Radial)
+def kernel_outline(camera, corners, kind=np.asarray):
+    """What the kernels take, for (N, 3, 3) corners in the camera frame."""
+    return outline(camera, *(kind(corners[:, i].T) for i in range(3)))
+
+
+def test_outlines_hold_every_sampled_point(camera):
+    if not hasattr(camera, "local_outline"):
+        assert isinstance(camera, mp.Orthographic)
         return
     corners = triangles(500, seed=4)
     low, high, seen = extent(camera, corners)
-    box = quick(*(np.moveaxis(corners[:, i], -1, 0) for i in range(3)))
-    assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 1e-9)
+    found = kernel_outline(camera, corners)
+    assert_holds(mp.Box(found.low.T, found.high.T, found.valid), low, high, seen, 1e-9)
 
 
 @pytest.mark.parametrize("quick", [False, True])
 def test_boxes_hold_in_float32_kernels(camera, quick):
     corners = triangles(500, seed=5)
     low, high, seen = extent(camera, corners)
-    method = getattr(camera, "local_bound_quick", camera.local_bound) if quick else camera.local_bound
-    box = method(*(types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)))
-    # Half a pixel of slack is what the kernels add; float32 may move a box by far less.
-    box = mp.Box(*(np.asarray(array.numpy()) for array in box))
+    corner = [types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)]
+    box = outline(camera, *corner) if quick and hasattr(camera, "local_outline") else camera.local_bound(*corner)
+    # The kernels widen boxes by more than float32 may move them.
+    box = mp.Box(*(np.asarray(array.numpy()) for array in box[:3]))
     assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 2e-3)
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.05, 0.3, 1.0])
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("name", ["paraboloid", "cosine_sphere", "equisolid", "equidistant", "paraboloid 270", "pinhole"])
+def test_lines_of_outlines_hold_every_sampled_point(name, precision, size):
+    """And they are there for small triangles, and touch them."""
+    camera, rng = cameras(512)[name], np.random.default_rng(11)
+    centre = camera.ray(rng.uniform(100, 412, (3000, 1, 2))).direction
+    corners = (centre + size * rng.normal(size=(3000, 3, 3))).astype(np.float32).astype(np.float64)
+    s = np.linspace(0, 1, 65)[:, None]
+    edges = np.concatenate([corners[:, [i]] * (1 - s) + corners[:, [(i + 1) % 3]] * s for i in range(3)], 1)
+    image = camera.project(edges)
+    pixel, valid = image.pixel[..., 0, :], image.valid[..., 0]
+    if precision == "float64":
+        lines = np.stack([np.stack(line) for line in kernel_outline(camera, corners).lines])
+    else:
+        found = kernel_outline(camera, corners, lambda p: types.Array3f(*p.astype(np.float32)))
+        lines = np.stack([np.stack([np.asarray(n.numpy()) for n in line]) for line in found.lines]).astype(np.float64)
+    known = np.abs(lines[:, :2]).sum((0, 1)) > 0
+    distance = np.einsum("kin,npi->nkp", lines[:, :2], pixel) + lines[:, 2].T[..., None]
+    distance = np.where(valid[:, None], distance, np.inf)[known]
+    assert known.mean() > (0.9 if size < 0.1 else 0.02)
+    assert distance.min() > (-1e-9 if precision == "float64" else -2e-3)
+    if size < 0.1:
+        assert np.median(distance.min(-1)) < 0.5
 
 
 @settings(max_examples=100, deadline=None)
@@ -96,7 +127,7 @@ def test_boxes_are_tight_for_triangles_in_view(name):
 
 
 @pytest.mark.parametrize("name", ["equisolid 360", "equidistant 270", "paraboloid 270"])
-@pytest.mark.parametrize("method", ["local_bound", "local_bound_quick", "local_bound_quads"])
+@pytest.mark.parametrize("method", ["local_bound", "outline", "local_bound_quads"])
 def test_boxes_hold_edges_that_pass_behind_the_eye(name, method):
     """Near the point behind the eye an image runs half around the rim within a tiny part of an edge."""
     camera = cameras(512)[name]
@@ -107,7 +138,8 @@ def test_boxes_hold_edges_that_pass_behind_the_eye(name, method):
     pixel, valid = image.pixel[..., 0, :], image.valid[..., 0]
     low = np.where(valid[..., None], pixel, np.inf).min(1)
     high = np.where(valid[..., None], pixel, -np.inf).max(1)
-    box = getattr(camera, method)(*(np.moveaxis(corners[:, i], -1, 0) for i in range(3)))
+    corner = [np.moveaxis(corners[:, i], -1, 0) for i in range(3)]
+    box = outline(camera, *corner) if method == "outline" else getattr(camera, method)(*corner)
     assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, valid.any(1), 1e-6)
 
 

@@ -13,7 +13,7 @@ import mpcam
 from mpcam.cameras.serialize import camera_to_json
 from mpcam.cli import main
 
-COMMANDS = ("compare", "render", "project", "doctor")
+COMMANDS = ("compare", "render", "project", "experiment", "doctor")
 
 
 def start(*arguments: str, **options) -> subprocess.Popen:
@@ -46,7 +46,7 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("frobnicate", "compare, render, project, stress, doctor"),
+        ("frobnicate", "compare, render, project, stress, experiment, doctor"),
         ("render", "SCENE"),
         ("render cube", "--output"),
         ("render cube --output a.png --frobnicate", "--frobnicate"),

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import mpcam as mp
+from mpcam.cameras.outline import outline
 from mpcam.rendering.device import lens, types
 from mpcam_kernels import central
 from mpcam_kernels.pipeline import BLOCK
@@ -31,7 +32,7 @@ def states(name):
     keep = (samples.spreads >= 0) & central.may_hit(shape, samples.centres, samples.spreads)
     blocks = SIZE // BLOCK
     kept = np.kron(np.asarray(dr.select(keep, t.UInt(1), 0).numpy()).reshape(blocks, blocks), np.ones((BLOCK, BLOCK)))
-    box = CAMERA.local_bound_quick(*corners[:, :, None])
+    box = outline(CAMERA, *corners[:, :, None])
     low = np.clip(np.ceil(box.low[:, 0] - 0.5), 0, SIZE)
     high = np.clip(np.floor(box.high[:, 0] + 0.5), 0, SIZE)
     v, u = np.indices((SIZE, SIZE))

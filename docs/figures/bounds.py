@@ -5,6 +5,7 @@ from matplotlib import pyplot
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 import mpcam as mp
+from mpcam.cameras.outline import outline
 
 CAMERA = mp.Radial.paraboloid(200, 200)
 
@@ -63,7 +64,7 @@ def rectangle(axes, box, **style):
 
 
 def quick(corners):
-    box = CAMERA.local_bound_quick(*corners[:, :, None])
+    box = outline(CAMERA, *corners[:, :, None])
     return mp.Box(box.low[:, 0], box.high[:, 0], box.valid[0])
 
 

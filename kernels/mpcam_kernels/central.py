@@ -12,11 +12,10 @@ Vector = Any
 
 
 class CentralTriangle(NamedTuple):
-    """Edge normals (towards the inside), the plane's normal n (away from the eye), and offset = n . a > 0."""
+    """Edge normals (towards the inside), and the plane as n with n . x = 1 for its points x."""
 
     edges: tuple[Vector, Vector, Vector]
-    normal: Vector
-    offset: Float
+    plane: Vector
     usable: Any
 
 
@@ -37,6 +36,11 @@ def _edge_normal(p: Vector, q: Vector) -> Vector:
     return dr.select(swap, -normal, normal)
 
 
+def turn(a: Vector, b: Vector, c: Vector) -> Float:
+    """Below zero where corners run counter-clockwise seen from the eye."""
+    return dr.dot(a, dr.cross(b - a, c - a))
+
+
 def setup(a: Vector, b: Vector, c: Vector) -> CentralTriangle:
     """Edge functions of triangles with corners a, b, c seen from the origin; unusable where seen edge-on."""
     normal = dr.cross(b - a, c - a)
@@ -44,15 +48,24 @@ def setup(a: Vector, b: Vector, c: Vector) -> CentralTriangle:
     edges = (_edge_normal(b, c), _edge_normal(c, a), _edge_normal(a, b))
     flip = offset < 0
     edges = tuple(dr.select(flip, -edge, edge) for edge in edges)
-    return CentralTriangle(edges, dr.select(flip, -normal, normal), abs(offset), offset != 0)
+    plane = normal / offset
+    usable = (offset != 0) & dr.isfinite(dr.squared_norm(plane))
+    return CentralTriangle(edges, plane, usable)  # pyright: ignore[reportArgumentType]
+
+
+def inside(triangle: CentralTriangle, direction: Vector) -> Any:
+    """Whether rays run between the three edges; false for a direction of zero length."""
+    e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
+    return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (e0 + e1 + e2 > 0)
 
 
 def hit(triangle: CentralTriangle, direction: Vector) -> tuple[Any, Float]:
-    """Whether rays hit the triangle, and the distance along the direction."""
+    """Whether rays run between the three edges, and the inverse of the distance along a unit direction.
+
+    Rays hit where both hold: between the edges, and an inverse distance above zero.
+    """
     e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
-    speed = dr.dot(triangle.normal, direction)
-    inside = (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (speed > 0)
-    return inside, triangle.offset / speed
+    return (e0 >= 0) & (e1 >= 0) & (e2 >= 0), dr.dot(triangle.plane, direction)
 
 
 def weights(triangle: CentralTriangle, direction: Vector) -> tuple[Float, Float]:
@@ -62,27 +75,26 @@ def weights(triangle: CentralTriangle, direction: Vector) -> tuple[Float, Float]
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: CentralTriangle, centre: Vector, spread: Float) -> Any:
-    """False only where no direction within `spread` (length of the difference) of `centre` hits the triangle."""
-    possible = triangle.usable
+def may_hit(triangle: CentralTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+    """False only where no direction of a square (see `samples.Bounds`) hits the triangle."""
+    possible = triangle.usable & (spread >= 0)
     for edge in triangle.edges:
-        reach = dr.sqrt(dr.squared_norm(edge))
-        possible = possible & (dr.dot(edge, centre) + reach * (spread + 1e-6) >= 0)
+        length = dr.sqrt(dr.squared_norm(edge))
+        reach = abs(dr.dot(edge, right)) + abs(dr.dot(edge, down)) + length * (spread + 1e-6)
+        possible = possible & (dr.dot(edge, centre) + reach >= 0)
     return possible
 
 
-ROWS = 4  # rows of four numbers that a set-up packs into
+ROWS = 3  # rows of four numbers that a set-up packs into
 
 
 def pack(types: Any, triangle: CentralTriangle) -> list[Any]:
     """The set-up in rows of four numbers."""
-    n = triangle.normal
-    rows = [types.Array4f(edge.x, edge.y, edge.z, part) for edge, part in zip(triangle.edges, n, strict=True)]
-    return [*rows, types.Array4f(triangle.offset, 0, 0, 0)]
+    return [types.Array4f(e.x, e.y, e.z, part) for e, part in zip(triangle.edges, triangle.plane, strict=True)]
 
 
 def unpack(rows: list[Any]) -> CentralTriangle:
     """The set-up of a usable triangle from its rows."""
     kind = type(rows[0].xyz)
     edges = (rows[0].xyz, rows[1].xyz, rows[2].xyz)
-    return CentralTriangle(edges, kind(rows[0].w, rows[1].w, rows[2].w), rows[3].x, True)
+    return CentralTriangle(edges, kind(rows[0].w, rows[1].w, rows[2].w), True)

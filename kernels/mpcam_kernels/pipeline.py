@@ -1,108 +1,125 @@
 """Nearest triangle of every pixel, by bounding each curved triangle and inverting per pixel; no rays are traced.
 
-One pass over the triangles bounds each image by a rectangle of pixels. Triangles with a small rectangle are finished
-there: their lane walks the rectangle, and the nearest wins by an atomic minimum of depth << 32 | triangle. The others
-are cut into blocks of 8 x 8 pixels; blocks that one edge excludes are dropped, the rest are binned by block, and each
-lane takes four pixels through their block's list with the nearest in registers. The result does not depend on the
-order of execution: ties go to the lower number.
+One pass over the triangles outlines each image by a box and three lines. Triangles with few pixels inside are finished
+there: their lane walks the spans between the lines. The others are listed by block of 8 x 8 pixels, with the parts
+of 4 x 4 that they may cover; blocks and parts outside of the lines, and those that one edge excludes, are dropped. Then
+each lane takes four pixels through their block's list with the nearest in registers. The result does not depend on the
+order of execution.
 
-The kernels know arrays and functions only: `box` bounds a triangle's image, `test` is `central`, `planar` or
-`projected`.
+The kernels know arrays and functions only: `outline` bounds a triangle's image, `test` is `central`, `planar` or
+`projected`, `output` says what is kept of a pixel.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
+from mpcam_kernels import blocks, pixels, walk
 from mpcam_kernels.frozen import frozen
-from mpcam_kernels.samples import BLOCK, Samples, blocks, place
+from mpcam_kernels.outputs import OUTPUTS
+from mpcam_kernels.regions import Outline, region
+from mpcam_kernels.samples import COARSE, PIXELS, Samples
+from mpcam_kernels.samples import blocks as blocks_of
 
-SMALL = 48  # pixels in a rectangle that one lane walks by itself
-PER_LANE = 4  # pixels of a lane in the pass over blocks: 16 lanes share a block, and gather a triangle for 64 tests
-PAIRS = 1 << 18  # triangle-block pairs held at a time; a scene with more is processed in chunks
+SMALL = 96  # pixels in a region that one lane walks by itself
+PAIRS = 1 << 18  # item-block pairs held at a time; the rest comes in chunks
 LANES = 1 << 22  # of those that look for pairs, at a time
-EMPTY = 0xFFFFFFFFFFFFFFFF
-
-
-@dataclass(frozen=True)
-class Large:
-    """Triangles whose rectangles are cut into blocks: set-up in four numbers a row, rectangles as low | high << 16."""
-
-    rows: list[Any]
-    triangle: Any
-    columns: Any
-    lines: Any
-    count: Any
 
 
 class Pipeline:
-    """The kernels of one combination of bound, test and image size; frozen, so that a frame records nothing anew.
+    """The kernels of one combination of outline, test, output and image size; frozen: a frame records nothing anew.
 
     Every array whose length depends on the scene comes in as an argument: a frozen function that makes one itself
     replays the length of the recording.
 
-    box(camera, a, b, c) gives (low, high, valid) in pixels. test: module with setup, hit, may_hit, weights, pack and
-    unpack. With count=True each frame also counts tests and covered samples. With exclude=False no block is dropped
-    because of an edge, and all pixels of a box are tested.
+    outline(camera, rows) gives the `Outline`s of triangles, of which rows[corner][row] holds four numbers each; the
+    first three of a corner's first row are its position. hidden(first) tells from the first rows where triangles are
+    surely not seen. test: module with setup, hit, inside, may_hit, pack and
+    unpack. output: "hits", "depth" or "coverage". cull: "none", or "back" or "front" to leave out the triangles that
+    turn this side to the eye. bounded: test all pixels inside of the outlines and none outside, as papers count them;
+    else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and hits.
     """
 
     def __init__(
         self,
         types: Any,
-        box: Callable[..., Any],
+        outline: Callable[..., list[Outline]],
+        hidden: Callable[..., Any],
         test: Any,
-        width: int,
-        height: int,
+        size: tuple[int, int],
+        *,
+        output: str = "hits",
+        cull: str = "none",
+        bounded: bool = False,
+        pieces: int = 1,
         count: bool = False,
-        exclude: bool = True,
     ):
-        self.types, self.box, self.test, self.count, self.exclude = types, box, test, count, exclude
-        self.width, self.height = width, height
-        self.block_columns, self.block_rows = blocks(width, height)
-        self.places = self.block_columns * self.block_rows * BLOCK * BLOCK
+        self.types, self.outline, self.hidden = types, outline, hidden
+        self.test, self.output = test, OUTPUTS[output]
+        self.width, self.height = size
+        self.cull, self.bounded, self.pieces, self.count = cull, bounded, pieces, count
+        self.columns, self.rows = blocks_of(*size)
         self._triangles = frozen(self._triangle_pass)
-        self._pairs = frozen(self._pair_pass)
-        self._bins = frozen(self._bin_pass)
+        self.squares = (-(-self.width // COARSE), -(-self.height // COARSE))
+        self._find = frozen(self._find_pass)
+        self._refine = frozen(self._refine_pass)
+        self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
 
-    def frame(
-        self, camera: Any, positions: Any, faces: Any, samples: Samples, done: Callable[[str, Any], None] | None = None
-    ) -> tuple[Any, Any]:
-        """Depth buffer (UInt64 per place: depth bits << 32 | triangle, EMPTY where nothing is) and counters or None.
+    @property
+    def places(self) -> int:
+        """Places of the buffer."""
+        return self.columns * self.rows * PIXELS
 
-        positions: 3 Floats per vertex; faces: 3 UInts per triangle. done(stage, arrays) is told after each pass.
+    def frame(
+        self,
+        camera: Any,
+        vertices: list[Any],
+        faces: Any,
+        samples: Samples,
+        done: Callable[[str, Any], None] | None = None,
+    ) -> tuple[Any, Any]:
+        """Keys of all places (see `outputs`), and counters (tests, hits) or None.
+
+        vertices: arrays of four numbers per vertex; faces: 3 UInts per triangle. done(stage, arrays) is told after
+        each pass.
         """
         types = self.types
         counters = dr.zeros(types.UInt64, 2) if self.count else None
         if dr.width(faces) < 3:
-            buffer = dr.full(types.UInt64, EMPTY, self.places)
+            buffer = dr.zeros(self.output.kind(types), self.places)
             dr.eval(buffer)
             return buffer, counters
         triangles = self._lanes(0, dr.width(faces) // 3)
-        lists = [dr.empty(types.UInt, dr.width(triangles)) for _ in range(3)]
-        rows = [dr.empty(types.Float, 4 * dr.width(triangles)) for _ in range(self.test.ROWS)]
-        buffer, large, counters = self._triangles(triangles, camera, positions, faces, samples, counters, lists, rows)
+        room = 4 * dr.width(triangles)
+        lists = [
+            [dr.empty(types.Float, room * self.pieces) for _ in range(3)],
+            [dr.empty(types.Float, room) for _ in range(self.test.ROWS)],
+        ]
+        buffer, large, counters = self._triangles(triangles, camera, vertices, faces, samples, counters, lists)
         if done:
             done("triangles", (buffer, large))
-        # Lanes are a large triangle and a row of blocks each: the pairs of one row always fit.
-        total = large.count[0] * self.block_rows
+        items = large.count[0]
+        per_item = blocks.share(items, *self.squares, PAIRS // blocks.BLOCKS)
+        total = items * per_item
         start, chunk = 0, min(total, LANES)
         while start < total:
             chunk = min(chunk, total - start)
-            lanes = self._lanes(start, start + chunk)
-            pairs, found, counts = self._pairs(lanes, samples, large)
-            needed = found[0]
+            squares = self._find(self._lanes(start, start + chunk), per_item, samples, large)
+            needed = squares.found[0] * blocks.BLOCKS
             if needed > PAIRS and chunk > 1:
                 chunk = max(1, chunk // (1 + needed // PAIRS))
                 continue
             if needed:
-                starts = dr.prefix_sum(counts)
-                bins = self._bins(self._lanes(0, needed), pairs, starts, dr.empty(types.UInt, needed))
+                pairs = self._refine(self._lanes(0, needed), samples, large, squares)
+                found = pairs.found[0]
+                room = [dr.empty(types.UInt, max(found, 1)) for _ in range(2)]
+                lists = blocks.Lists(*room, dr.prefix_sum(pairs.counts), pairs.counts)
+                lists = self._list(self._lanes(0, found), pairs, lists) if found else lists
                 if done:
-                    done("bins", bins)
-                buffer, counters = self._pixels(samples, large, bins, starts, counts, buffer, counters)
+                    done("lists", lists)
+                buffer, counters = self._pixels(samples, large, lists, buffer, counters)
                 if done:
                     done("pixels", buffer)
             start += chunk
@@ -117,147 +134,83 @@ class Pipeline:
         self,
         triangle: Any,
         camera: Any,
-        positions: Any,
+        vertices: list[Any],
         faces: Any,
         samples: Samples,
         counters: Any,
-        lists: list[Any],
-        rows: list[Any],
-    ) -> tuple[Any, Large, Any]:
-        types = self.types
-        buffer = dr.full(types.UInt64, EMPTY, self.places)
+        lists: list[list[Any]],
+    ) -> tuple[Any, blocks.Large, Any]:
+        types, test = self.types, self.test
+        buffer = dr.zeros(self.output.kind(types), self.places)
         dr.make_opaque(buffer)
+        large = blocks.Large(*lists, dr.zeros(types.UInt, 1))
         corners = dr.gather(types.Array3u, faces, triangle)
-        a, b, c = (dr.gather(types.Array3f, positions, corner) for corner in corners)
-        shape = self.test.setup(a, b, c)
-        low, high, valid = self.box(camera, a, b, c)
-        x0, x1 = _pixels(types, low[0], high[0], self.width)
-        y0, y1 = _pixels(types, low[1], high[1], self.height)
-        seen = valid & shape.usable & (x0 < x1) & (y0 < y1)
-        small = seen & ((x1 - x0) * (y1 - y0) <= SMALL)
-        counters = self._walk(shape, triangle, (x0, y0, x1, y1), small, samples, buffer, counters)
-        large = seen & ~small
-        count = dr.zeros(types.UInt, 1)
-        slot = dr.scatter_inc(count, types.UInt(0), large)
-        for target, value in zip(lists, (triangle, x0 | (x1 << 16), y0 | (y1 << 16)), strict=True):
-            dr.scatter(target, types.UInt(value), slot, large)
-        for target, row in zip(rows, self.test.pack(types, shape), strict=True):
-            dr.scatter(target, row, slot, large)
-        return buffer, Large(rows, lists[0], lists[1], lists[2], count), counters
+        first = [dr.gather(types.Array4f, vertices[0], corner) for corner in corners]
+        points = [row.xyz for row in first]
+        shown = ~self.hidden(first)
+        if self.cull != "none":
+            turn = test.turn(*points)
+            shown = shown & ((turn < 0) if self.cull == "back" else (turn > 0))
 
-    def _walk(
-        self, shape: Any, triangle: Any, rectangle: Any, active: Any, samples: Samples, buffer: Any, counters: Any
-    ) -> Any:
-        """Test every pixel of a lane's rectangle and keep the nearest; returns the counters."""
-        types, (x0, y0, x1, y1) = self.types, rectangle
-        identity = types.UInt64(triangle)
+        def outlined(tests: Any, hits: Any) -> tuple[Any, Any]:
+            rows = [[row, *(dr.gather(types.Array4f, r, n) for r in vertices[1:])] for row, n in zip(first, corners, strict=True)]
+            for outline in self.outline(camera, rows):
+                area, seen = region(types, outline, self.width, self.height)
 
-        def body(x: Any, y: Any, covered: Any) -> Any:
-            pixel = place(types.UInt(x), types.UInt(y), self.width)
-            inside, depth = self.test.hit(shape, dr.gather(type(samples.pixels), samples.pixels, pixel))
-            inside = inside & (depth < dr.inf)
-            packed = _packed(types, depth, identity)
-            # Direct: private copies per thread, the default, cost more to clear and merge than the atomics do.
-            dr.scatter_reduce(dr.ReduceOp.Min, buffer, packed, pixel, inside, mode=dr.ReduceMode.Direct)
-            ended = x + 1 >= x1
-            covered = covered + dr.select(inside, 1, 0) if self.count else covered
-            return dr.select(ended, x0, x + 1), dr.select(ended, y + 1, y), covered
+                def covered(tests: Any, hits: Any, area: Any = area, seen: Any = seen) -> tuple[Any, Any]:
+                    shape = test.setup(*points)
+                    usable = seen & shape.usable
+                    small = usable & (area.pixels <= SMALL)
+                    more = walk.walk(
+                        types, test, self.output, shape, triangle, area, small, samples, self.width, buffer, self.count
+                    )
+                    blocks.append(types, test, area, shape, triangle, usable & ~small, large)
+                    return tests + more[0], hits + more[1]
 
-        start = dr.select(active, y0, y1)
-        _, _, covered = dr.while_loop((x0, start, types.UInt(0)), lambda x, y, covered: y < y1, body)
-        return self._counted(counters, dr.select(active, types.UInt64((x1 - x0) * (y1 - y0)), 0), covered)
+                tests, hits = dr.if_stmt((tests, hits), seen, covered, lambda tests, hits: (tests, hits))
+            return tests, hits
 
-    def _pair_pass(self, lanes: Any, samples: Samples, large: Large) -> tuple[Any, Any, Any]:
-        """Blocks that each large triangle may cover: one lane per triangle and row of blocks."""
-        types = self.types
-        item, row = lanes // self.block_rows, types.Int(lanes % self.block_rows)
-        lines = dr.gather(types.UInt, large.lines, item)
-        active = (row * BLOCK < types.Int(lines >> 16)) & ((row + 1) * BLOCK > types.Int(lines & 0xFFFF))
-        columns = dr.gather(types.UInt, large.columns, item, active)
-        shape = self._unpacked(large, item, active)
-        first, last = types.Int(columns & 0xFFFF) // BLOCK, (types.Int(columns >> 16) + BLOCK - 1) // BLOCK
-        found = dr.zeros(types.UInt, 1)
-        counts = dr.zeros(types.UInt, self.block_columns * self.block_rows)
-        dr.make_opaque(counts)
-        pairs = [dr.empty(types.UInt, PAIRS) for _ in range(3)]
+        none = (types.UInt(0), types.UInt(0))
+        counted = dr.if_stmt(none, shown, outlined, lambda tests, hits: (tests, hits))
+        return buffer, large, self._counted(counters, *counted)
 
-        def body(column: Any) -> Any:
-            block = types.UInt(row * self.block_columns + column)
-            spread = dr.gather(types.Float, samples.spreads, block)
-            centre = dr.gather(type(samples.centres), samples.centres, block)
-            keep = (spread >= 0) & (self.test.may_hit(shape, centre, spread) if self.exclude else True)
-            slot: Any = dr.scatter_inc(found, types.UInt(0), keep)
-            fits = keep & (slot < PAIRS)
-            rank = dr.scatter_inc(counts, block, fits)
-            for target, value in zip(pairs, (item, block, rank), strict=True):
-                dr.scatter(target, value, slot, fits)
-            return (column + 1,)
+    def _find_pass(self, lanes: Any, per_item: int, samples: Samples, large: blocks.Large) -> blocks.Squares:
+        most = PAIRS // blocks.BLOCKS
+        return blocks.find_squares(self.types, self._picker, lanes, per_item, samples, large, self.squares[0], most)
 
-        dr.while_loop((dr.select(active, first, last),), lambda column: column < last, body)
-        return pairs, found, counts
+    def _refine_pass(self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares) -> blocks.Pairs:
+        grid = (self.columns, self.rows)
+        return blocks.find_pairs(self.types, self._picker, lanes, samples, large, grid, squares, PAIRS)
 
-    def _bin_pass(self, lanes: Any, pairs: list[Any], starts: Any, bins: Any) -> Any:
-        """Large triangles block by block."""
-        item, block, rank = (dr.gather(self.types.UInt, values, lanes) for values in pairs)
-        dr.scatter(bins, item, dr.gather(self.types.UInt, starts, block) + rank)
-        return bins
+    def _list_pass(self, lanes: Any, pairs: blocks.Pairs, lists: blocks.Lists) -> blocks.Lists:
+        return blocks.list_pairs(self.types, lanes, pairs, lists)
+
+    @property
+    def _picker(self) -> Any:
+        return _Everything(self.test) if self.bounded else self.test
 
     def _pixel_pass(
-        self, samples: Samples, large: Large, bins: Any, starts: Any, counts: Any, buffer: Any, counters: Any
+        self, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
     ) -> tuple[Any, Any]:
-        """Nearest of each pixel's block's list and of what the buffer holds; neighbours go through the same list."""
-        types = self.types
-        lane = dr.arange(types.UInt, self.places // PER_LANE)
-        block = lane // (BLOCK * BLOCK // PER_LANE)
-        parts = [dr.gather(types.Array4f, part, lane) for part in samples.pixels]
-        views = [type(samples.pixels)(*(part[k] for part in parts)) for k in range(PER_LANE)]
-        before = dr.gather(types.Array4u64, buffer, lane)
-        start, length = dr.gather(types.UInt, starts, block), dr.gather(types.UInt, counts, block)
-        end = start + length
+        size = (self.width, self.height)
+        keys, *counted = pixels.through_lists(
+            self.types, self.test, self.output, samples, large, lists, buffer, size, self.bounded, self.count
+        )
+        return keys, self._counted(counters, *counted)
 
-        def body(index: Any, depths: Any, triangles: Any, covered: Any) -> Any:
-            item = dr.gather(types.UInt, bins, index)
-            shape = self._unpacked(large, item)
-            triangle = dr.gather(types.UInt, large.triangle, item)
-            nearest, first = [], []
-            for view, depth_before, triangle_before in zip(views, depths, triangles, strict=True):
-                inside, depth = self.test.hit(shape, view)
-                nearer = (depth < depth_before) | ((depth == depth_before) & (triangle < triangle_before))
-                nearest.append(dr.select(inside & nearer, depth, depth_before))
-                first.append(dr.select(inside & nearer, triangle, triangle_before))
-                covered = covered + dr.select(inside & (depth < dr.inf), 1, 0) if self.count else covered
-            return index + 1, nearest, first, covered
-
-        # The largest triangle number at an infinite depth stands for nothing: nothing is nearer than it and infinite.
-        depths = [dr.fmin(dr.reinterpret_array(types.Float, types.UInt(value >> 32)), dr.inf) for value in before]
-        state = (start, depths, [types.UInt(value) for value in before], types.UInt(0))
-        found: Any = dr.while_loop(state, lambda index, depths, triangles, covered: index < end, body)
-        _, depths, triangles, covered = found
-        values = [_packed(types, depth, types.UInt64(t)) for depth, t in zip(depths, triangles, strict=True)]
-        values = [dr.select(depth < dr.inf, v, EMPTY) for depth, v in zip(depths, values, strict=True)]
-        result = dr.empty(types.UInt64, self.places)
-        dr.scatter(result, types.Array4u64(*values), lane)
-        return result, self._counted(counters, types.UInt64(length * PER_LANE), covered)
-
-    def _unpacked(self, large: Large, item: Any, active: Any = True) -> Any:
-        return self.test.unpack([dr.gather(self.types.Array4f, row, item, active) for row in large.rows])
-
-    def _counted(self, counters: Any, tests: Any, covered: Any) -> Any:
-        """The counters with (tests, covered) of all lanes added."""
+    def _counted(self, counters: Any, tests: Any, hits: Any) -> Any:
+        """The counters with tests and hits of all lanes added."""
         if self.count:
-            dr.scatter_reduce(dr.ReduceOp.Add, counters, tests, self.types.UInt(0))
-            dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(covered), self.types.UInt(1))
+            for slot, value in enumerate((tests, hits)):
+                dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(value), self.types.UInt(slot))
         return counters
 
 
-def _packed(types: Any, depth: Any, triangle: Any) -> Any:
-    """Depth and triangle in one number, which orders by depth, then by triangle."""
-    return (types.UInt64(dr.reinterpret_array(types.UInt, depth)) << 32) | triangle
+class _Everything:
+    """A test that no edge excludes a block from."""
 
+    def __init__(self, test: Any):
+        self.unpack = test.unpack
 
-def _pixels(types: Any, low: Any, high: Any, size: int) -> tuple[Any, Any]:
-    """First and one past the last pixel whose centre lies in [low, high], widened by what rounding can amount to."""
-    slack = 2e-6 * size + 1e-3
-    first = dr.ceil(dr.maximum(low - (0.5 + slack), 0.0))
-    last = dr.floor(dr.minimum(high + (0.5 + slack), float(size)))
-    return types.Int(dr.minimum(first, float(size))), types.Int(dr.maximum(last, 0.0))
+    def may_hit(self, shape: Any, *bounds: Any) -> Any:
+        return True

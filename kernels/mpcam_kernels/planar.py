@@ -24,9 +24,14 @@ def _edge(p: Vector, q: Vector, flip: Any) -> tuple[Vector, Vector]:
     return low, dr.select(swap ^ flip, low - high, high - low)
 
 
+def turn(a: Vector, b: Vector, c: Vector) -> Float:
+    """Below zero where corners run counter-clockwise in the image (v points down)."""
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+
+
 def setup(a: Vector, b: Vector, c: Vector) -> PlanarTriangle:
     """Edge functions of image triangles; x, y of the corners are pixels and z their depths."""
-    area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+    area = turn(a, b, c)
     flip = area < 0
     pairs = [_edge(p.xy, q.xy, flip) for p, q in ((b, c), (c, a), (a, b))]
     depths = type(a)(a.z, b.z, c.z)
@@ -41,12 +46,17 @@ def _edges(triangle: PlanarTriangle, pixel: Vector) -> list[Float]:
     ]
 
 
+def inside(triangle: PlanarTriangle, pixel: Vector) -> Any:
+    """Whether pixels are covered, at a depth above zero."""
+    return hit(triangle, pixel)[0]
+
+
 def hit(triangle: PlanarTriangle, pixel: Vector) -> tuple[Any, Float]:
-    """Whether pixels are covered, and the linearly interpolated depth there (which must be positive)."""
+    """Whether pixels are covered at a depth above zero, and the inverse of that depth, which is linear in the image."""
     e0, e1, e2 = _edges(triangle, pixel)
     total = e0 + e1 + e2
-    depth = (e0 * triangle.depths.x + e1 * triangle.depths.y + e2 * triangle.depths.z) / total
-    return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (total > 0) & (depth > 0), depth
+    depth = e0 * triangle.depths.x + e1 * triangle.depths.y + e2 * triangle.depths.z
+    return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (total > 0) & (depth > 0), total / depth
 
 
 def weights(triangle: PlanarTriangle, pixel: Vector) -> tuple[Float, Float]:
@@ -56,12 +66,12 @@ def weights(triangle: PlanarTriangle, pixel: Vector) -> tuple[Float, Float]:
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: PlanarTriangle, centre: Vector, spread: Float) -> Any:
-    """False only where no pixel within `spread` of `centre` along each axis is covered."""
-    possible = triangle.usable
+def may_hit(triangle: PlanarTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+    """False only where no pixel of a square (see `samples.Bounds`) is covered."""
+    possible = triangle.usable & (spread >= 0)
     for value, step in zip(_edges(triangle, centre), triangle.steps, strict=True):
-        reach = abs(step.x) + abs(step.y)
-        possible = possible & (value + reach * (spread + 1e-3) >= 0)
+        reach = abs(step.x * down.y) + abs(step.y * right.x) + (abs(step.x) + abs(step.y)) * 1e-3
+        possible = possible & (value + reach >= 0)
     return possible
 
 

@@ -8,8 +8,10 @@ from typing import Any
 from mpcam_kernels import planar
 from mpcam_kernels.planar import ROWS as ROWS
 from mpcam_kernels.planar import hit as hit
+from mpcam_kernels.planar import inside as inside
 from mpcam_kernels.planar import may_hit as may_hit
 from mpcam_kernels.planar import pack as pack
+from mpcam_kernels.planar import turn as turn
 from mpcam_kernels.planar import unpack as unpack
 from mpcam_kernels.planar import weights as weights
 

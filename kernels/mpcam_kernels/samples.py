@@ -1,7 +1,8 @@
 """Per-pixel samples, kept block by block, and bounds of the blocks.
 
-Blocks of 8 x 8 pixels follow each other row by row, and so do the pixels in a block: the pixels that one triangle
-covers lie close together in memory. Blocks at the right and lower border may hold places without a pixel.
+Blocks of 8 x 8 pixels follow each other row by row. Within a block come its four parts of 4 x 4, and there the pixels
+row by row: the pixels that one triangle covers lie close together in memory. Blocks at the right and lower border may
+hold places without a pixel.
 """
 
 from dataclasses import dataclass
@@ -9,20 +10,40 @@ from typing import Any
 
 import drjit as dr
 
-BLOCK = 8
+BLOCK = 8  # pixels along a side of a block
+PART = 4  # of the parts of a block
+COARSE = 16  # of the squares of blocks that are looked at first
+PIXELS = BLOCK * BLOCK
 NOWHERE = -1e9  # image coordinate that no triangle covers
 
 
 @dataclass(frozen=True)
 class Samples:
-    """One sample per place (ray directions or pixel centres), and per block its centre and the spread around it.
+    """One sample per place (ray directions or pixel centres), and bounds of the samples of squares of pixels.
 
-    spread is negative for blocks without a valid pixel.
+    coarse: bounds of squares of COARSE pixels, row by row; parts: of the parts of the blocks, in the order of places.
     """
 
     pixels: Any
-    centres: Any
-    spreads: Any
+    coarse: "Bounds"
+    parts: "Bounds"
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Samples of squares: centre + s right + t down, s and t from -1 to 1, and no more than `spread` off.
+
+    rows: arrays of four numbers a square: centre and spread; right; down. Without the last two, they are zero. The
+    spread is negative where no pixel is valid.
+    """
+
+    rows: list[Any]
+
+    def __call__(self, types: Any, number: Any, active: Any = True) -> tuple[Any, Any, Any, Any]:
+        """Centre, right, down and spread of squares by number."""
+        first, *tilt = (dr.gather(types.Array4f, row, number, active) for row in self.rows)
+        right, down = (row.xyz for row in tilt) if tilt else (types.Array3f(0), types.Array3f(0))
+        return first.xyz, right, down, first.w
 
 
 def blocks(width: int, height: int) -> tuple[int, int]:
@@ -33,7 +54,8 @@ def blocks(width: int, height: int) -> tuple[int, int]:
 def place(x: Any, y: Any, width: int) -> Any:
     """Place of a pixel in block order."""
     block = (y // BLOCK) * (-(-width // BLOCK)) + x // BLOCK
-    return block * (BLOCK * BLOCK) + (y % BLOCK) * BLOCK + x % BLOCK
+    part = ((y >> 2) & 1) * 2 + ((x >> 2) & 1)
+    return block * PIXELS + (part << 4) + ((y & 3) << 2) + (x & 3)
 
 
 def places(types: Any, width: int, height: int) -> Any:
@@ -45,8 +67,10 @@ def places(types: Any, width: int, height: int) -> Any:
 def pixel_of(types: Any, index: Any, width: int, height: int) -> tuple[Any, Any, Any]:
     """Column and row of a place, and whether there is a pixel."""
     columns, _ = blocks(width, height)
-    block, within = index // (BLOCK * BLOCK), index % (BLOCK * BLOCK)
-    x, y = (block % columns) * BLOCK + within % BLOCK, (block // columns) * BLOCK + within // BLOCK
+    block = index // PIXELS
+    part = (index >> 4) & 3
+    x = (block % columns) * BLOCK + ((part & 1) << 2) + (index & 3)
+    y = (block // columns) * BLOCK + ((part >> 1) << 2) + ((index >> 2) & 3)
     return x, y, (x < width) & (y < height)
 
 
@@ -59,47 +83,84 @@ def pixel_centres(types: Any, width: int, height: int) -> Any:
 def central_samples(types: Any, direction: Any, valid: Any, width: int, height: int) -> Samples:
     """Directions of rays, given row by row; zero, which hits nothing, where a pixel has none."""
     columns, rows = blocks(width, height)
-    index = dr.arange(types.UInt, columns * rows * BLOCK * BLOCK)
+    index = dr.arange(types.UInt, columns * rows * PIXELS)
     x, y, exists = pixel_of(types, index, width, height)
     known = dr.select(valid, types.Array3f(direction), 0.0)
     pixels = dr.gather(types.Array3f, known, y * width + x, exists)
     dr.eval(pixels)
-    centres, spreads = _block_bounds(types, pixels, columns * rows)
-    return Samples(pixels, centres, spreads)
+    return Samples(pixels, *(_bounds(types, pixels, *square) for square in _squares(types, width, height)))
 
 
 def planar_samples(types: Any, valid: Any, width: int, height: int) -> Samples:
     """Pixel centres themselves; NOWHERE where a pixel (given row by row) is not valid."""
     columns, rows = blocks(width, height)
-    index = dr.arange(types.UInt, columns * rows * BLOCK * BLOCK)
+    index = dr.arange(types.UInt, columns * rows * PIXELS)
     x, y, exists = pixel_of(types, index, width, height)
     usable = dr.gather(types.Bool, valid, y * width + x, exists)
     pixels = dr.select(usable, types.Array2f(types.Float(x), types.Float(y)) + 0.5, NOWHERE)
-    block = dr.arange(types.UInt, columns * rows)
-    centres = (types.Array2f(types.Float(block % columns), types.Float(block // columns)) + 0.5) * BLOCK
-    spreads = dr.full(types.Float, 0.5 * (BLOCK - 1), columns * rows)
-    dr.eval(pixels, centres, spreads)
-    return Samples(pixels, centres, spreads)
+    dr.eval(pixels)
+    squares = []
+    for x, y, side, _ in _squares(types, width, height):
+        half = 0.5 * (side - 1)
+        centre = types.Array4f(types.Float(x) + 0.5 * side, types.Float(y) + 0.5 * side, 0, 0)
+        squares.append(_flat(centre, types.Array4f(half, 0, 0, 0), types.Array4f(0, half, 0, 0)))
+    return Samples(pixels, *squares)
 
 
-def _block_bounds(types: Any, pixels: Any, count: int) -> tuple[Any, Any]:
-    """Mean direction of each block's valid pixels, and the largest difference from it (-1 where none is valid)."""
-    block = dr.arange(types.UInt, count)
-    zero, size = dr.zeros(types.UInt, count), BLOCK * BLOCK
+def _squares(types: Any, width: int, height: int) -> list[tuple[Any, Any, int, int]]:
+    """Left and upper pixel of the coarse squares and of the parts, their side, and the width of the image."""
+    columns, rows = -(-width // COARSE), -(-height // COARSE)
+    coarse = dr.arange(types.UInt, columns * rows)
+    count = blocks(width, height)[0] * blocks(width, height)[1] * PIXELS // (PART * PART)
+    x, y, _ = pixel_of(types, dr.arange(types.UInt, count) * (PART * PART), width, height)
+    return [((coarse % columns) * COARSE, (coarse // columns) * COARSE, COARSE, width), (x, y, PART, width)]
 
-    def direction(k: Any) -> Any:
-        return dr.gather(types.Array3f, pixels, block * size + k)
 
-    def add(k: Any, total: Any) -> Any:
-        return k + 1, total + direction(k)
+def _flat(*rows: Any) -> Bounds:
+    """Bounds from rows of four numbers."""
+    empty = 0 * rows[0]
+    rows = [dr.ravel(row + empty) for row in rows]
+    dr.eval(rows)
+    return Bounds(rows)
+
+
+def _bounds(types: Any, pixels: Any, left: Any, top: Any, side: int, width: int) -> Bounds:
+    """Bounds of the valid pixels of squares, by the mean and, for small ones, the slopes of a plane through them."""
+    tilted = side <= PART  # the larger ones only choose among the small
+    count, zero = dr.width(left), dr.zeros(types.UInt, dr.width(left))
+    last, half, many = dr.width(pixels) - 1, 0.5 * (side - 1), side * side
+
+    def sample(k: Any) -> tuple[Any, Any, Any, Any]:
+        x, y = left + k % side, top + k // side
+        within = (x < -(-width // BLOCK) * BLOCK) & (place(x, y, width) <= last)
+        s, t = (types.Float(k % side) - half) / half, (types.Float(k // side) - half) / half
+        d = dr.gather(types.Array3f, pixels, place(x, y, width), within)
+        return d, s, t, dr.squared_norm(d) > 0
+
+    def add(k: Any, total: Any, found: Any) -> Any:
+        d, _, _, valid = sample(k)
+        return k + 1, total + d, found + dr.select(valid, types.Float(1), 0)
+
+    def tilt(k: Any, right: Any, down: Any) -> Any:
+        d, s, t, valid = sample(k)
+        away = dr.select(valid, d - centre, 0)
+        return k + 1, right + s * away, down + t * away
 
     def widen(k: Any, spread: Any) -> Any:
-        d = direction(k)
-        return k + 1, dr.select(dr.squared_norm(d) > 0, dr.maximum(spread, dr.norm(d - centre)), spread)
+        d, s, t, valid = sample(k)
+        return k + 1, dr.select(valid, dr.maximum(spread, dr.norm(d - centre - s * right - t * down)), spread)
 
-    _, total = dr.while_loop((zero, dr.zeros(types.Array3f, count)), lambda k, t: k < size, add)
-    length = dr.norm(total)
-    centre = dr.select(length > 0, total / dr.maximum(length, 1e-30), types.Array3f(0, 0, 1))
-    _, spreads = dr.while_loop((zero, dr.full(types.Float, -1.0, count)), lambda k, s: k < size, widen)
-    dr.eval(centre, spreads)
-    return centre, spreads
+    def all_samples(k: Any, *_: Any) -> Any:
+        return k < many
+
+    nothing = dr.zeros(types.Array3f, count)
+    _, total, found = dr.while_loop((zero, nothing, types.Float(0)), all_samples, add)
+    centre = total / dr.maximum(found, 1)
+    right, down = nothing, nothing
+    if tilted:
+        _, right, down = dr.while_loop((zero, nothing, nothing), all_samples, tilt)
+        squares = sum((k % side - half) ** 2 for k in range(many)) / half**2
+        right, down = right / squares, down / squares
+    _, spread = dr.while_loop((zero, dr.full(types.Float, -1.0, count)), all_samples, widen)
+    rows = [types.Array4f(*row, w) for row, w in ((centre, spread), (right, 0), (down, 0))]
+    return _flat(*(rows if tilted else rows[:1]))

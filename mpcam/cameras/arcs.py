@@ -176,15 +176,16 @@ def visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array
     """
     reach = sqrt(a[2] * a[2] + tangent[2] * tangent[2])
     crest = atan2(tangent[2], a[2])
-    ratio = cos(0.5 * camera.fov + 0.0 * reach) / where(reach > 0, reach, 1.0)
-    half = where(ratio >= 1, 0.0, acos(maximum(minimum(ratio, 1.0), -1.0)))
     slack = 8 * PI * epsilon(reach)
+    lowest = cos(0.5 * camera.fov + 0.0 * reach) - slack  # an arc along the rim is seen, whichever side rounding takes
+    everything = lowest <= -reach
+    ratio = where(everything, -1.0, lowest / where(reach > 0, reach, 1.0))
+    half = where(ratio >= 1, 0.0, acos(maximum(minimum(ratio, 1.0), -1.0)))
     parts = []
     for turn in (-2 * PI, 0.0, 2 * PI):
         first = maximum(crest + turn - half - slack, 0.0)
         last = minimum(crest + turn + half + slack, length)
         parts.append((first, last, (last >= first) & (ratio <= 1 + slack)))
-    everything = ratio <= -1
     start, end, valid = parts[0]
     twice = valid & False
     for first, last, some in parts[1:]:
@@ -195,7 +196,7 @@ def visible_part(camera: RadialCamera, a: Vector, tangent: Vector, length: Array
     return start, maximum(end - start, 0.0), valid | everything, twice & ~everything
 
 
-def _clean(a: Vector, b: Vector, c: Vector) -> tuple[list[Vector], Array]:
+def unit_corners(a: Vector, b: Vector, c: Vector) -> tuple[list[Vector], Array]:
     """Unit directions of finite corners (others replaced), and whether all are finite."""
     finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
     corners = [vector(where(finite, p[0], 0.0), where(finite, p[1], 0.0), where(finite, p[2], 1.0)) for p in (a, b, c)]
@@ -211,7 +212,7 @@ def _disc(camera: RadialCamera, box: Box, whole: Array) -> Box:
 
 def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box: EdgeBox = arc_box) -> Box:
     """Box of a triangle (camera frame): union of its edges' boxes and of the rim points that lie inside it."""
-    corners, finite = _clean(a, b, c)
+    corners, finite = unit_corners(a, b, c)
     if not camera.profile.convex:
         box = sector_bound(camera, corners)
         return Box(box.low, box.high, box.valid & finite)
@@ -244,43 +245,11 @@ def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box
     return _padded(camera, Box(box.low, box.high, box.valid & finite))
 
 
-def radial_bound_quick(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
-    """Box by the tangents at the corners where the triangle is inside the view and its edges turn little.
-
-    Elsewhere the annular sector of the triangle's bounding cone. Both hold the image; neither needs a root.
-    """
-    corners, finite = _clean(a, b, c)
+def radial_bound_rough(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> Box:
+    """Box of the annular sector of the triangle's bounding cone: cheap, and good for any increasing profile."""
+    corners, finite = unit_corners(a, b, c)
     sector = sector_bound(camera, corners)
-    if not camera.profile.convex:
-        return Box(sector.low, sector.high, sector.valid & finite)
-    images, tangents, inside = [], [], finite
-    # An edge of at most 45 degrees between corners nearer than 153 degrees keeps away from the point behind the eye.
-    furthest = minimum(0.95 * camera.profile.limit, 0.85 * PI)
-    for k in range(3):
-        after, before = corners[(k + 1) % 3], corners[(k + 2) % 3]
-        forward = vector(*(after[i] - corners[k][i] for i in range(3)))
-        backward = vector(*(corners[k][i] - before[i] for i in range(3)))
-        pixel, slopes, theta = image_and_slopes(camera, corners[k], forward, backward)
-        images.append(pixel)
-        tangents.append(slopes)
-        inside = inside & (theta < minimum(0.5 * camera.fov, furthest)) & (dot(corners[k], after) > 0.7)
-    low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
-    high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
-    for k in range(3):
-        m0, m1, g0, g1 = images[k], images[(k + 1) % 3], tangents[k][0], tangents[(k + 1) % 3][1]
-        agreement = g0[0] * g1[0] + g0[1] * g1[1]
-        squares = (g0[0] * g0[0] + g0[1] * g0[1]) * (g1[0] * g1[0] + g1[1] * g1[1])
-        inside = inside & ((squares == 0) | ((agreement > 0) & (agreement * agreement > 0.75 * squares)))
-        for i in (0, 1):
-            limit = tangent_limit(m0, g0, m1, g1, i, 1.0, _FAR)
-            high[i] = maximum(high[i], where((g0[i] > 0) & (g1[i] < 0), limit, high[i]))
-            low[i] = minimum(low[i], where((g0[i] < 0) & (g1[i] > 0), limit, low[i]))
-    box = Box(
-        vector(*(where(inside, low[i], sector.low[i]) for i in (0, 1))),
-        vector(*(where(inside, high[i], sector.high[i]) for i in (0, 1))),
-        finite & (inside | sector.valid),
-    )
-    return _padded(camera, box)
+    return Box(sector.low, sector.high, sector.valid & finite)
 
 
 class Cone(NamedTuple):
@@ -352,7 +321,7 @@ def outer_bound(camera: RadialCamera, limit: Array, a: Vector, b: Vector, c: Vec
     limit: radians. It takes no profile beyond the rim, and stands for images that reach very far out, whose rounding
     errors are large. Not valid where there is no such part.
     """
-    corners, finite = _clean(a, b, c)
+    corners, finite = unit_corners(a, b, c)
     cone = bounding_cone(corners)
     half_fov = 0.5 * camera.fov
     reached = cone.wide | ((cone.theta + cone.spread >= half_fov) & (cone.theta - cone.spread <= limit))
@@ -376,7 +345,12 @@ def _wrapped(angle: Array) -> Array:
     return where(angle < -PI, angle + 2 * PI, angle)
 
 
+def rounding(camera: RadialCamera, like: Array) -> Array:
+    """Pixels by which rounding can move an image: 200 units in the last place of the radius, for the type of `like`."""
+    return 200 * epsilon(like) * camera.radius
+
+
 def _padded(camera: RadialCamera, box: Box) -> Box:
-    """A box grown by what rounding can amount to: a few hundred units in the last place of the radius."""
-    pad = 200 * epsilon(box.low[0]) * camera.radius
+    """A box grown by what rounding can amount to."""
+    pad = rounding(camera, box.low[0])
     return Box(vector(box.low[0] - pad, box.low[1] - pad), vector(box.high[0] + pad, box.high[1] + pad), box.valid)

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_quick
+from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_rough
+from mpcam.cameras.outline import Lens, Outline, small_outline, symmetric_lens
 from mpcam.cameras.profiles import Profile, bulges_outward
 from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
 from mpcam.cameras.types import Box, Domain, Projection, Ray
@@ -158,9 +159,20 @@ class Calibrated:
         """
         return self._bound(radial_bound, a, b, c)
 
-    def local_bound_quick(self, a: Vector, b: Vector, c: Vector) -> Box:
-        """A cheaper conservative box, as tight for small triangles."""
-        return self._bound(radial_bound_quick, a, b, c)
+    def local_lens(self, point: Vector) -> Lens:
+        """What a vertex knows of the projection around it, for `local_outline`."""
+        limit = self.angle_limit()
+        convex = self.limit is not None and self.convex
+        view = limit if self.limit is None else self.edge
+        return symmetric_lens(self._profile(limit, convex), view, limit, point)
+
+    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+        """Box and three lines around a small triangle, and whether they hold."""
+        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, lenses)
+
+    def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """A cheap conservative box, for triangles of which `local_outline` is not sure."""
+        return self._bound(radial_bound_rough, a, b, c)
 
     def _bound(self, bound: Callable[..., Box], a: Vector, b: Vector, c: Vector) -> Box:
         limit = self.angle_limit()

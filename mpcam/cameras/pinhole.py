@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any, Self
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.outline import HIDDEN, NEAR, UNSURE, Lens, Outline, small_outline
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, epsilon, isfinite, maximum, minimum, norm, normalize, tan, vector, where
@@ -101,3 +102,19 @@ class Pinhole(Camera):
                 high[i] = where(crosses & (toward >= -slack), _FAR, high[i])
         valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
         return Box(vector(*low), vector(*high), valid)
+
+    def local_lens(self, point: Vector) -> Lens:
+        """What a vertex knows of the projection around it, for `local_outline`."""
+        z, size = point[2], norm(point)
+        near = z > 1e-3 * size  # farther out, rounding in the image is no longer small against pixels
+        inverse = 1.0 / where(near, z, 1.0)
+        place = where(near, NEAR, where(z > -1e-6 * size, UNSURE, HIDDEN))
+        return Lens(inverse, 0.0 * z, inverse * inverse, where(size > 0, place, UNSURE))
+
+    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+        """Box and three lines around a small triangle, and whether they hold."""
+        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, lenses)
+
+    def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """The box for triangles of which `local_outline` is not sure."""
+        return self.local_bound(a, b, c)

@@ -15,6 +15,7 @@ from mpcam.math import (
     cos,
     cross,
     dot,
+    epsilon,
     maximum,
     minimum,
     norm,
@@ -103,25 +104,25 @@ def _ellipse_rectangle(camera: RadialCamera, ends: list[Vector]) -> list[Vector]
 
 
 def _circle_quad(camera: RadialCamera, ends: list[Vector], images: list[Vector]) -> list[Vector]:
-    """Chord, and the tangent parallel to it: circle centre -cot(b) towards the highest point, radius 1 / sin(b).
+    """Chord, and the tangent parallel to it: the image of the arc is less than half a circle of radius 1 / sin(b).
 
-    b is the angle of the highest point from the axis (equation 6 of the paper, whose sign is mended).
+    b is the angle of the great circle's highest point from the axis (equation 6 of the paper, whose sign is mended).
+    The height over the chord comes from its length, not from the circle's centre: a short chord of a large circle would
+    lose all its digits there.
     """
-    toward, _, sine, cosine = _axes(ends)
-    scale = camera.pixels_per_radius
-    straight = sine < 1e-4  # through the axis: the arc is a straight line
-    safe = where(straight, 1.0, sine)
-    centre = vector(camera.cx - scale * (cosine / safe) * toward[0], camera.cy - scale * (cosine / safe) * toward[1])
-    radius = scale / safe
+    _, _, sine, _ = _axes(ends)
+    radius = camera.pixels_per_radius / maximum(sine, 1e-12)  # hardly bent where the circle passes through the axis
     middle = vector(0.5 * (images[0][0] + images[1][0]), 0.5 * (images[0][1] + images[1][1]))
     chord = vector(images[1][0] - images[0][0], images[1][1] - images[0][1])
-    length = sqrt(chord[0] * chord[0] + chord[1] * chord[1])
+    squared = chord[0] * chord[0] + chord[1] * chord[1]
+    length = sqrt(squared)
     out = vector(-chord[1] / where(length > 0, length, 1.0), chord[0] / where(length > 0, length, 1.0))
     # Outwards is where the arc's middle direction lands.
     arc_middle, _, _ = image_and_slopes(camera, vector(*(ends[0][i] + ends[1][i] for i in range(3))))
     side = where((arc_middle[0] - middle[0]) * out[0] + (arc_middle[1] - middle[1]) * out[1] < 0, -1.0, 1.0)
-    offset = side * ((centre[0] - middle[0]) * out[0] + (centre[1] - middle[1]) * out[1])
-    height = where(straight, 1e-3 * length, maximum(radius + offset, 0.0))
+    # Near half a circle the height changes fast with the chord: a chord a little longer errs to the safe side.
+    rest = sqrt(maximum(radius * radius - 0.25 * squared * (1 + 8 * epsilon(squared)), 0.0))
+    height = 0.25 * squared / (radius + rest)
     shift = vector(side * out[0] * height, side * out[1] * height)
     return [vector(image[0] + shift[0], image[1] + shift[1]) for image in images]
 

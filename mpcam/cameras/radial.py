@@ -4,8 +4,10 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
-from mpcam.cameras.arcs import radial_bound, radial_bound_quick
+from mpcam.cameras.arcs import radial_bound, radial_bound_rough
 from mpcam.cameras.base import Camera
+from mpcam.cameras.chords import Piece, radial_bound_triangles
+from mpcam.cameras.outline import Lens, Outline, small_outline, symmetric_lens
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
 from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
@@ -140,6 +142,19 @@ class Radial(Camera):
         """Box of the quads around the curved edges: the paper's looser bound, for comparison."""
         return radial_bound_quads(self, a, b, c)
 
-    def local_bound_quick(self, a: Vector, b: Vector, c: Vector) -> Box:
-        """A cheaper conservative box, as tight for small triangles."""
-        return radial_bound_quick(self, a, b, c)
+    def local_bound_triangles(self, a: Vector, b: Vector, c: Vector) -> list[Piece]:
+        """The paper's bounding triangles: four pieces, each valid or not, whose union holds the curved triangle."""
+        return radial_bound_triangles(self, a, b, c)
+
+    def local_lens(self, point: Vector) -> Lens:
+        """What a vertex knows of the projection around it, for `local_outline`."""
+        return symmetric_lens(self.profile, 0.5 * self.fov, 0.5 * self.fov, point)
+
+    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+        """Box and three lines around a small triangle, and whether they hold."""
+        scale = self.pixels_per_radius
+        return small_outline((self.cx, self.cy), (scale, scale), points, lenses)
+
+    def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
+        """A cheap conservative box, for triangles of which `local_outline` is not sure."""
+        return radial_bound_rough(self, a, b, c)

@@ -11,10 +11,10 @@ from mpcam.comparison import metrics, timing
 from mpcam.comparison.facts import machine_facts, scene_facts
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.plan import Choice, make_plan
+from mpcam.comparison.progress import Progress, Steps
 from mpcam.comparison.table import Comparison, Row
 from mpcam.errors import InputError
 
-Progress = Callable[[int, int, str], None]
 WARMUP = 2
 MOTION = 1e-3
 """How far the vertices of the moving scene swing, as a share of the scene's diagonal."""
@@ -69,7 +69,7 @@ def compare(
     mesh = scene.mesh
     plan = make_plan(mesh.triangle_count, methods, settings)
     each = 1 + (1 + WARMUP + repeats) * (3 if moving else 2)
-    steps = _Steps(progress, 2 + len(plan) * each)
+    steps = Steps(progress, 2 + len(plan) * each)
 
     truth = rasterize(camera, mesh, method="raytrace")
     truth_image = np.asarray(shade(truth, scene, shading))
@@ -120,7 +120,7 @@ def compare(
     if moving:
         positions = moving_vertices(mesh)
         moved = timing.measure(
-            {label: _moving(case.prepared, positions) for label, case in cases.items()},
+            {label: moving_frame(case.prepared, positions) for label, case in cases.items()},
             repeats,
             WARMUP,
             stages={label: case.prepared.stages for label, case in cases.items()},
@@ -223,7 +223,8 @@ class _Shading:
         return shade_device(self.hits, self.scene, self.shading)
 
 
-def _moving(prepared: Any, positions: Sequence[np.ndarray]) -> Callable[[], object]:
+def moving_frame(prepared: Any, positions: Sequence[np.ndarray]) -> Callable[[], object]:
+    """A frame that starts with new vertices: each call takes the next of `positions`."""
     count = 0
 
     def frame() -> object:
@@ -253,18 +254,3 @@ def _how(repeats: int, moving: bool) -> dict[str, str]:
         "from each hit pixel's centre to the exact image (float64) of the point that the triangle and barycentrics name"
     )
     return how
-
-
-class _Steps:
-    """Counts steps for the progress callback."""
-
-    def __init__(self, progress: Progress | None, total: int):
-        self.progress, self.total, self.count = progress, total, 0
-
-    def done(self, what: str) -> None:
-        self.count += 1
-        if self.progress is not None:
-            self.progress(self.count, self.total, what)
-
-    def skip(self, steps: int) -> None:
-        self.total -= steps

@@ -1,12 +1,14 @@
-"""The files of a comparison: written beside the target first, so that a failure leaves nothing half-written."""
+"""The files of a result: written beside the target first, so that a failure leaves nothing half-written."""
 
 import json
 import os
 import re
 import secrets
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +20,8 @@ from mpcam.io.images import write_image
 if TYPE_CHECKING:
     from mpcam.comparison.table import Comparison
 
-RESULTS = "results.json"
+PAGE, RESULTS = "report.html", "results.json"
+_LISTED = re.compile(r"(?:images/)?[a-z0-9.-]+\.(?:png|csv)")
 
 
 def check_output(output: str | Path) -> None:
@@ -35,8 +38,19 @@ def write(comparison: "Comparison", output: str | Path) -> Path:
     """Write all files of a comparison into a folder and return the path of the report page.
 
     report.html (self-contained), results.csv, results.json, pareto.png, truth.exr (linear light, distances, camera) and
-    images/*.png. A new folder appears whole or not at all; in an existing one only these files are replaced, and those
-    of an older comparison that have no successor are removed. Raises `InputError` for an unusable folder.
+    images/*.png. Raises `InputError` for an unusable folder.
+    """
+    with written_whole(output) as folder:
+        _fill(comparison, folder)
+    return Path(output).absolute() / PAGE
+
+
+@contextmanager
+def written_whole(output: str | Path) -> Iterator[Path]:
+    """A folder to write the files of a result into, which become the files of `output` when the block ends.
+
+    A new folder appears whole or not at all; in an existing one only these files are replaced, and those that an older
+    result lists in its results.json and that have no successor are removed. Raises `InputError` for an unusable folder.
     """
     check_output(output)
     target = Path(output).absolute()
@@ -49,11 +63,17 @@ def write(comparison: "Comparison", output: str | Path) -> Path:
             f"Output {str(output)!r} cannot be written: {error.strerror}; choose another folder."
         ) from error
     try:
-        _fill(comparison, staging)
+        yield staging
         _publish(staging, target)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return target / "report.html"
+
+
+def write_results(folder: Path, results: dict[str, Any]) -> None:
+    """results.json of a folder that holds all its other files: what is given, and their names."""
+    files = sorted(str(p.relative_to(folder).as_posix()) for p in folder.rglob("*") if p.is_file()) + [RESULTS]
+    text = json.dumps(results | {"files": sorted(files)}, indent=2, allow_nan=False)
+    (folder / RESULTS).write_text(text + "\n", encoding="utf-8")
 
 
 def differences(comparison: "Comparison") -> dict[str, np.ndarray]:
@@ -94,10 +114,8 @@ def _fill(comparison: "Comparison", folder: Path) -> None:
     (folder / "results.csv").write_text(comparison.to_csv(), encoding="utf-8")
     plot.draw(comparison, folder / "pareto.png")
     page = report.build(comparison, page_images)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    files = sorted(str(p.relative_to(folder).as_posix()) for p in folder.rglob("*") if p.is_file()) + [RESULTS]
-    results = comparison.to_dict() | {"files": sorted(files)}
-    (folder / RESULTS).write_text(json.dumps(results, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / PAGE).write_text(page, encoding="utf-8")
+    write_results(folder, comparison.to_dict())
 
 
 def _publish(staging: Path, target: Path) -> None:
@@ -114,12 +132,12 @@ def _publish(staging: Path, target: Path) -> None:
 
 
 def _own_files(target: Path) -> set[Path]:
-    """Images that an older comparison in this folder says it wrote; anything else in the folder is not ours."""
+    """Files that an older result in this folder says it wrote; anything else in the folder is not ours."""
     try:
         listed = json.loads((target / RESULTS).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError, KeyError, TypeError):
         return set()
-    return {Path(name) for name in listed if isinstance(name, str) and re.fullmatch(r"images/[a-z0-9.-]+\.png", name)}
+    return {Path(name) for name in listed if isinstance(name, str) and _LISTED.fullmatch(name)}
 
 
 def _names(labels: list[str]) -> dict[str, str]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 BUDGET = 14_000_000
 """Bytes of images in the page, as text; beyond it they are shown smaller (the PNG files beside it stay whole)."""
-SCRIPTS = ("format.js", "plot.js", "table.js", "viewer.js", "main.js")
+SCRIPTS = ("format.js", "plot.js", "table.js", "viewer.js", "theme.js", "main.js")
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,17 @@ def build(comparison: "Comparison", images: Mapping[str, RowImages] | None = Non
     data = comparison.to_dict() | {"headline": headline(comparison)} | _image_data(comparison, images or {}, budget)
     parts = {
         "TITLE": html.escape(f"{comparison.name}: error against run time"),
-        "STYLE": _part("style.css"),
+        "STYLE": page_part("style.css"),
         "DATA": embed_json(data),
-        "SCRIPT": "\n".join(_part(name) for name in SCRIPTS),
+        "SCRIPT": "\n".join(page_part(name) for name in SCRIPTS),
     }
+    return fill(page_part("report_template.html"), parts)
+
+
+def fill(template: str, parts: Mapping[str, str]) -> str:
+    """The template with each {{NAME}} replaced by the part of that name; parts are taken as they are."""
     # split rather than replace one after the other: a part may contain another's mark
-    pieces = _part("report_template.html").split("{{")
+    pieces = template.split("{{")
     text = [pieces[0]]
     for piece in pieces[1:]:
         name, rest = piece.split("}}", 1)
@@ -55,18 +60,19 @@ def embed_json(data: Any) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _part(name: str) -> str:
+def page_part(name: str) -> str:
+    """A file of the folder `page`, as text."""
     return (files("mpcam.comparison") / "page" / name).read_text(encoding="utf-8")
 
 
 def _image_data(comparison: "Comparison", images: Mapping[str, RowImages], budget: int) -> dict[str, Any]:
     shrink = 1
     while True:
-        truth = "" if comparison.truth_image is None else _data_uri(comparison.truth_image, shrink)
+        truth = "" if comparison.truth_image is None else data_uri(comparison.truth_image, shrink)
         rows = {
             label: [
-                _data_uri(item.image, shrink),
-                "" if item.difference is None else _data_uri(item.difference, shrink),
+                data_uri(item.image, shrink),
+                "" if item.difference is None else data_uri(item.difference, shrink),
             ]
             for label, item in images.items()
         }
@@ -76,7 +82,8 @@ def _image_data(comparison: "Comparison", images: Mapping[str, RowImages], budge
         shrink *= 2
 
 
-def _data_uri(image: np.ndarray, shrink: int) -> str:
+def data_uri(image: np.ndarray, shrink: int = 1) -> str:
+    """A linear image (H, W, 3) as a PNG within the text of a page, `shrink` times smaller."""
     if shrink > 1:
         image = _box_filtered(np.asarray(image, np.float64), shrink)
     with tempfile.TemporaryDirectory() as folder:

@@ -14,34 +14,17 @@ from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, type
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
+from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
 
 MOST_PIXELS = 32767  # along a side: kernels keep two pixel numbers in 32 bits
-
-
-def curved_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
-    """The camera's own box of a triangle; the cheaper one where it has two."""
-    box = getattr(camera, "local_bound_quick", camera.local_bound)(a, b, c)
-    return box.low, box.high, box.valid
-
-
-def quads_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
-    """The box of the quads around a triangle's curved edges."""
-    box = camera.local_bound_quads(a, b, c)
-    return box.low, box.high, box.valid
-
-
-def image_box(camera: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any]:
-    """Box of straight-edged image triangles; without an image where a corner is not finite."""
-    import drjit as dr
-
-    low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
-    return low.xy, high.xy, dr.isfinite(a.x + b.x + c.x + a.y + b.y + c.y + a.z + b.z + c.z)
 
 
 @functools.lru_cache(maxsize=64)
 def _pipeline(
     test: str,
-    bound: str,
+    outline: str,
+    output: str,
+    cull: str,
     model: type | None,
     static: tuple[Any, ...],
     width: int,
@@ -49,11 +32,21 @@ def _pipeline(
     count: bool,
     backend: str,
 ) -> Any:
-    """The frozen kernels of a test, an image size and, for curved images, a camera model and its static fields."""
+    """The frozen kernels of a test, an output, an image size and, for curved images, a camera model's static fields."""
     from mpcam_kernels.pipeline import Pipeline
 
-    box = quads_box if bound == "quad" else curved_box if model else image_box
-    return Pipeline(types(), box, kernel_test(test), width, height, count, exclude=bound == "tight")
+    return Pipeline(
+        types(),
+        OUTLINES[outline],
+        HIDDEN_TESTS.get(outline, hidden_never),
+        kernel_test(test),
+        (width, height),
+        output=output,
+        cull=cull,
+        bounded=outline in ("quad", "triangle"),
+        pieces=PIECES.get(outline, 1),
+        count=count,
+    )
 
 
 def kernel_test(name: str) -> Any:
@@ -72,6 +65,7 @@ class Buffered:
     method: ClassVar[str]
     bound: str = "tight"
     output: str = "hits"
+    cull: str = "none"
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
@@ -91,8 +85,11 @@ class Buffered:
         """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
         self.vertices = self.device.place(np.asarray(vertices))
 
-    def place(self, vertices: Any) -> Any:
-        """Device vertices to what the kernels take: camera frame in units of the mesh's scale, or (pixel, depth)."""
+    def place(self, vertices: Any) -> list[Any]:
+        """Device vertices to what the kernels take, a list of arrays with four numbers per vertex.
+
+        The first array starts with the position: camera frame in units of the mesh's scale, or (pixel, depth).
+        """
         raise TypeError(f"{type(self).__name__} must define place")
 
     def parent(self, triangle: Any) -> Any:
@@ -106,7 +103,7 @@ class Buffered:
     def buffer(self, clock: Clock | None = None) -> tuple[Any, Any]:
         """Placed vertices and the depth buffer over them."""
         done = clock.done if clock else None
-        positions = self.place(self.vertices) if self.mesh.triangle_count else self.vertices
+        positions = self.place(self.vertices) if self.mesh.triangle_count else [self.vertices]
         if done:
             done("vertices", positions)
         return positions, self._run(positions, done, count=False)[0]
@@ -124,40 +121,42 @@ class Buffered:
             camera, model = self.lens.on_device, type(self.camera)
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         size = (self.camera.width, self.camera.height)
-        kernels = _pipeline(self.test, self.bound, model, static, *size, count, backend_name())
+        outline = self.bound if self.curved else "straight"
+        kernels = _pipeline(
+            self.test, outline, self.output, self.cull, model, static, *size, count, backend_name()
+        )
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
     @exclusive
     def frame(self) -> Any:
         """One frame, evaluated: Hits, DepthMap or CoverageMap."""
-        hits = self._hits(*self.buffer())
-        if self.output == "depth":
-            return DepthMap(self.camera, hits.device_depth)
-        if self.output == "coverage":
-            import drjit as dr
-
-            mask = hits.device_triangle >= 0
-            dr.eval(mask)
-            return CoverageMap(self.camera, mask, self.lens.ray.valid)
-        return hits
+        return self._decoded(*self.buffer())
 
     @exclusive
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()
-        self._hits(*self.buffer(clock))
+        self._decoded(*self.buffer(clock))
         clock.done("decode")
         return clock.seconds
 
-    def _hits(self, positions: Any, buffer: Any) -> Hits:
+    def _decoded(self, positions: list[Any], keys: Any) -> Any:
+        unit = self.unit if self.curved else opaque_one()
+        found = _frozen_decode(self.output, self.camera.width, self.camera.height)(keys, unit)
+        if self.output == "depth":
+            return DepthMap(self.camera, found[0])
+        if self.output == "coverage":
+            return CoverageMap(self.camera, found[0], self.lens.ray.valid)
+        return self._hits(positions, *found)
+
+    def _hits(self, positions: list[Any], small: Any, depth: Any) -> Hits:
         width, height, faces, samples = self.camera.width, self.camera.height, self.faces, self.samples.pixels
-        small, depth = _frozen_decode(width, height)(buffer, self.unit if self.curved else opaque_one())
         triangle = self.parent(small)
 
         def weights() -> tuple[Any, Any]:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
-            found = _frozen_weights(self.test, width, height)(small, positions, faces, samples)
+            found = _frozen_weights(self.test, width, height)(small, positions[0], faces, samples)
             return self.parent_weights(small, *found)
 
         def stats() -> Stats:
@@ -176,17 +175,24 @@ def opaque_one() -> Any:
 
 
 @functools.cache
-def _frozen_decode(width: int, height: int) -> Any:
-
+def _frozen_decode(output: str, width: int, height: int) -> Any:
+    """Kernel from keys to what a frame holds, pixels row by row."""
     from mpcam_kernels import decode
     from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.outputs import OUTPUTS as KINDS
+
+    kind = KINDS[output]
 
     @frozen
-    def both(buffer: Any, unit: Any) -> tuple[Any, Any]:
-        found = decode.in_rows(types(), types().UInt64, buffer, width, height)
-        return decode.triangles(types(), found), decode.depths(types(), found, unit)
+    def decoded(keys: Any, unit: Any) -> tuple[Any, ...]:
+        t = types()
+        found = decode.in_rows(t, kind.kind(t), keys, width, height)
+        if output == "coverage":
+            return (found != 0,)
+        depth = decode.depths(t, kind, found, unit)
+        return (depth,) if output == "depth" else (decode.triangles(t, kind, found), depth)
 
-    return both
+    return decoded
 
 
 @functools.cache

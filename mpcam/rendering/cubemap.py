@@ -110,7 +110,7 @@ class Cubemapped:
                 return depth * 0.0, depth * 0.0
             directions = _texel_directions(texel, self.resolution, self.half)
             front = self.faces[0]  # its frame is the camera's own
-            found = decode.weights(types(), central, frames[0][0], front.faces, triangle, directions)
+            found = decode.weights(types(), central, frames[0][0][0], front.faces, triangle, directions)
             dr.eval(found)
             return found
 
@@ -187,17 +187,18 @@ def _frozen_look_up(resolution: int, half: bool) -> Any:
 
     from mpcam_kernels import decode, samples
     from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.outputs import Hits as KeptHits
 
     @frozen
     def look_up(directions: Any, valid: Any, buffers: list[Any], unit: Any) -> tuple[Any, Any, Any]:
         t = types()
         texel = _texel(directions, resolution, half)
-        found = t.UInt64(decode.EMPTY)
+        found = t.UInt64(0)
         for buffer, (width, height, start) in zip(buffers, _layout(resolution, half), strict=True):
             inside = valid & (texel >= start) & (texel < start + width * height)
             local = texel - start
             at = samples.place(local % width, local // width, width)
             found = dr.select(inside, dr.gather(t.UInt64, buffer, at, inside), found)
-        return decode.triangles(t, found), decode.depths(t, found, unit), texel
+        return decode.triangles(t, KeptHits, found), decode.depths(t, KeptHits, found, unit), texel
 
     return look_up

@@ -207,11 +207,3 @@ def to_camera(pose: list[Any], vertices: Any, count: Any) -> Any:
     x, y, z = dr.gather(t.Array3f, vertices, count)
     rows = [pose[3 * i] * x + pose[3 * i + 1] * y + pose[3 * i + 2] * z + pose[9 + i] for i in range(3)]
     return t.Array3f(*rows)
-
-
-def flat(target: Any, vector: Any, index: Any) -> Any:
-    """Component-first vectors to one array of 3 numbers per item, written over `target`."""
-    import drjit as dr
-
-    dr.scatter(target, vector, index)
-    return target

@@ -7,54 +7,78 @@ from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import flat, to_camera, types
+from mpcam.rendering.device import to_camera, types
+from mpcam.rendering.outlines import ROWS
 
-BOUNDS = ("tight", "quad")
+BOUNDS = ("tight", "triangle", "quad")
+CULLS = ("none", "back", "front")
 
 
 class Inverted(Buffered):
     """Frames by bounding each curved triangle and testing the rays of the pixels inside.
 
     Central cameras test rays through one point; parallel rays are straight in the image plane and are tested there.
-    bound: "tight" takes boxes from the tangents at the corners (from the bounding cone where edges turn much) and
-    drops blocks of pixels that one edge excludes; "quad" tests every pixel in the box of the quads around the curved
-    edges (Gascuel et al. 2008, 3.4).
+    bound: "tight" takes a box and three lines from the tangents at the corners (a box from the bounding cone where
+    edges turn much) and drops what one edge excludes; "triangle" tests every pixel in one to four bounding triangles
+    (Gascuel et al. 2008, 3.3), "quad" every pixel in the box of the quads around the curved edges (3.4). output: "hits",
+    "depth" or "coverage". cull: "none", or "back" or "front": triangles that turn this side to the eye are left out;
+    corners run counter-clockwise seen from the front.
     """
 
     method = "invert"
 
-    def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits"):
+    def __init__(
+        self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"
+    ):
         if bound not in BOUNDS:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
-        if bound == "quad" and not hasattr(camera, "local_bound_quads"):
+        if cull not in CULLS:
+            raise InputError(f"cull={cull!r}: allowed are {', '.join(CULLS)}")
+        if bound != "tight" and not hasattr(camera, f"local_bound_{bound}s"):
             raise InputError(
-                f"bound='quad' is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
+                f"bound={bound!r} is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
             )
         super().__init__(camera, mesh, "central" if camera.central else "planar")
-        self.bound, self.output = bound, output
+        self.bound, self.output, self.cull = bound, output, cull
 
-    def place(self, vertices: Any) -> Any:
+    def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
         number = dr.arange(types().UInt, dr.width(vertices) // 3)
         dr.make_opaque(number)
-        target = dr.empty(types().Float, dr.width(vertices))
-        return _frozen_place(self.curved)(number, target, self.lens.on_device, self.pose, self.unit, vertices)
+        rows = ROWS[self.bound] if self.curved else 1
+        targets = [dr.empty(types().Float, 4 * dr.width(number)) for _ in range(rows)]
+        model = type(self.camera)
+        static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
+        place = _frozen_place(self.curved, model, static if self.curved else (), rows)
+        return place(number, targets, self.lens.on_device, self.pose, self.unit, vertices)
 
 
-@functools.cache
-def _frozen_place(curved: bool) -> Any:
-    """Kernel that brings vertices to the camera frame, or into the image plane for parallel rays."""
+@functools.lru_cache(maxsize=64)
+def _frozen_place(curved: bool, model: type, static: tuple[Any, ...], rows: int) -> Any:
+    """Kernel that brings vertices to the camera frame, or into the image plane for parallel rays.
+
+    A second row takes what each vertex knows of the projection around it.
+    """
+    import drjit as dr
 
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def place(number: Any, target: Any, camera: Any, pose: list[Any], unit: Any, vertices: Any) -> Any:
+    def place(number: Any, targets: list[Any], camera: Any, pose: list[Any], unit: Any, vertices: Any) -> list[Any]:
+        four = types().Array4f
         point = to_camera(pose, vertices, number)
         if not curved:
             point = point * unit
             pixel, _ = camera.local_image(point)
-            point = types().Array3f(pixel.x, pixel.y, point.z)
-        return flat(target, point, number)
+            values = [four(pixel.x, pixel.y, point.z, 0)]
+        elif rows == 1:
+            values = [four(*point, 0)]
+        else:
+            lens = camera.local_lens(point)
+            values = [four(*point, lens.place), four(lens.s, lens.p, lens.q, 0)]
+        for target, value in zip(targets, values, strict=True):
+            dr.scatter(target, value, number)
+        return targets
 
     return place

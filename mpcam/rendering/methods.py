@@ -37,7 +37,8 @@ def prepare(
     """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
 
     output: what frames hold: "hits", or with method "invert" less and faster: "depth" (a DepthMap) or "coverage" (a
-    CoverageMap). settings: `bound` ("tight" or "quad") for invert; `level` (0 to 7) for vertex; `resolution` (pixels
+    CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad") and `cull` ("none",
+    "back" or "front": the sides of triangles that are not shown; corners run counter-clockwise in front); `level` (0 to 7) for vertex; `resolution` (pixels
     per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where
     a method cannot serve the camera.
     """
@@ -47,7 +48,7 @@ def prepare(
         )
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
-    kinds = {"invert": ("bound",), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
+    kinds = {"invert": ("bound", "cull"), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
         raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
     allowed = kinds.get(method, ())
@@ -96,12 +97,26 @@ def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **sett
 
 
 def render(
-    camera: Camera, scene: Any, method: str = "invert", *, shading: str = "light", **settings: Any
+    camera: Camera,
+    scene: Any,
+    method: str = "invert",
+    *,
+    shading: str = "light",
+    shadows: bool = False,
+    shadow_size: int = 1024,
+    **settings: Any,
 ) -> np.ndarray:
     """An image: (H, W, 3) float32, linear RGB.
 
-    scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). method
-    and settings: see `rasterize`. Raises InputError.
+    scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
+    whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
+    shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
+    frames of a still scene, make the maps once and give them to `shade`. Raises InputError.
     """
     whole = Scene.of(scene)
-    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading)
+    maps: Any = ()
+    if shadows:
+        from mpcam.effects.shadows import shadow_maps
+
+        maps = shadow_maps(whole, shadow_size, shading)
+    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading, maps)

@@ -2,6 +2,7 @@
 
 import functools
 import weakref
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,11 @@ class Attributes:
     def normals(self) -> Any:
         """3 numbers per vertex, or per face where the mesh has no shading normals."""
         return _upload(self._normals if self._normals is not None else self._face_normals)
+
+    @functools.cached_property
+    def face_normals(self) -> Any:
+        """3 numbers per face."""
+        return _upload(self._face_normals) if self.smooth else self.normals
 
     @functools.cached_property
     def uv(self) -> Any:
@@ -85,13 +91,14 @@ def attributes(mesh: Mesh) -> Attributes:
 
 
 @exclusive
-def shade(hits: Hits, scene: Any = None, shading: str = "light") -> np.ndarray:
+def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequence[Any] = ()) -> np.ndarray:
     """Colours of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
 
     scene: the Scene (or Mesh) that the hits were made with; default: the hits' mesh. shading: "color" (material and
     vertex colour), "texture" (the same times the texture), "normal" (world shading normal towards the viewer, 0.5 +
-    0.5 n), "light" (texture, lit: Lambert's law, both sides, ambient, no shadows; without lights, one at the viewer).
-    Raises InputError for another shading, or a scene whose mesh the hits do not belong to.
+    0.5 n), "light" (texture, lit: Lambert's law, both sides, ambient; without lights, one at the viewer). shadows: the
+    shadow maps of the scene's lights, in their order (see `shadow_map`), for "light"; default: no shadows. Raises
+    InputError for another shading, a scene whose mesh the hits do not belong to, and shadow maps of other lights.
     """
     whole = Scene.of(hits.mesh if scene is None else scene)
     if shading not in SHADINGS:
@@ -101,12 +108,31 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light") -> np.ndarray:
             f"the scene has {whole.mesh.triangle_count} triangles and the hits are on {hits.mesh.triangle_count}: "
             "give the scene that was rasterized"
         )
-    colour = shade_device(hits, whole, shading)
+    _check_shadows(shadows, whole, shading)
+    colour = shade_device(hits, whole, shading, shadows)
     return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
 
 
+def check_shadow_shading(shading: str) -> None:
+    """See that a shading has lights that can cast shadows."""
+    if shading != "light":
+        raise InputError(f"shadows go with shading='light', not with {shading!r}: leave one of them out")
+
+
+def _check_shadows(shadows: Sequence[Any], scene: Scene, shading: str) -> None:
+    """See that shadow maps are those of the scene's lights."""
+    if len(shadows) == 0:
+        return
+    check_shadow_shading(shading)
+    if [getattr(one, "light", None) for one in shadows] != list(scene.lights):
+        raise InputError(
+            f"shadows: {len(shadows)} shadow maps that are not those of the scene's {len(scene.lights)} lights: "
+            "give one mpcam.shadow_map(scene, light) for each light, in the scene's order"
+        )
+
+
 @exclusive
-def shade_device(hits: Hits, scene: Scene, shading: str = "light") -> Any:
+def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequence[Any] = ()) -> Any:
     """As `shade`, but the colours stay on the device: an evaluated Array3f, one entry per pixel."""
     import drjit as dr
 
@@ -134,8 +160,11 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light") -> Any:
         kinds = tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
         data["ambient"] = opaque_numbers(list(scene.ambient))
         data["lights"] = [_light_numbers(light, hits) for light in scene.lights]
-        if "point" in kinds:
+        if "point" in kinds or shadows:
             data["origin"], data["depth"] = ray.origin, hits.device_depth  # pyright: ignore[reportPossiblyUnboundVariable]
+        if shadows:
+            data["face_normals"] = table.face_normals
+            data["shadows"] = [one.on_device(hits.camera.eye) for one in shadows]
     kernel = _kernel(shading, kinds, table.smooth)
     return kernel(hits.device_triangle, weights, data)
 
@@ -188,7 +217,7 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
             elif not lights:
                 colour *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
             else:
-                colour *= _lit(t, data, lights, normal)
+                colour *= _lit(t, data, lights, normal, face, hit)
         return dr.select(hit, colour, t.Array3f(*data["background"]))
 
     return kernel
@@ -216,19 +245,30 @@ def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> 
     return dr.select(some, upper * (1 - fy) + lower * fy, 1.0)
 
 
-def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any) -> Any:
-    """Light that arrives, for a white surface: ambient and Lambert's law for each light."""
+def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, face: Any, hit: Any) -> Any:
+    """Light that arrives, for a white surface: ambient and Lambert's law for each light that is not in shadow."""
     import drjit as dr
 
-    total = t.Array3f(*data["ambient"])
-    for kind, numbers in zip(lights, data["lights"], strict=True):
+    total, reached = t.Array3f(*data["ambient"]), [True] * len(lights)
+    if "shadows" in data:
+        # From the eye, in world axes: float32 holds the place wherever the scene is.
+        local = [data["origin"][i] + data["direction"][i] * data["depth"] for i in range(3)]
+        flat = dr.gather(t.Array3f, data["face_normals"], face, hit)
+        reached = [shadow.visible(_to_world(t, data["pose"], local), flat) for shadow in data["shadows"]]
+    for kind, numbers, lit in zip(lights, data["lights"], reached, strict=True):
         place, strength = t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:])
         if kind == "directional":
-            total += strength * dr.maximum(dr.dot(normal, place), 0)
-            continue
-        origin, direction, pose = data["origin"], data["direction"], data["pose"]
-        away = [place[i] - (origin[i] + direction[i] * data["depth"]) for i in range(3)]  # camera frame
-        world = t.Array3f(*(pose[i] * away[0] + pose[3 + i] * away[1] + pose[6 + i] * away[2] for i in range(3)))
-        squared = dr.maximum(dr.squared_norm(world), 1e-30)
-        total += strength * dr.maximum(dr.dot(normal, world), 0) * dr.rsqrt(squared) / squared
+            arriving = dr.maximum(dr.dot(normal, place), 0)
+        else:
+            origin, direction = data["origin"], data["direction"]
+            away = [place[i] - (origin[i] + direction[i] * data["depth"]) for i in range(3)]  # camera frame
+            world = _to_world(t, data["pose"], away)
+            squared = dr.maximum(dr.squared_norm(world), 1e-30)
+            arriving = dr.maximum(dr.dot(normal, world), 0) * dr.rsqrt(squared) / squared
+        total += strength * (arriving if lit is True else dr.select(lit, arriving, 0.0))
     return total
+
+
+def _to_world(t: Any, pose: list[Any], vector: list[Any]) -> Any:
+    """A vector of the camera frame in world axes."""
+    return t.Array3f(*(pose[i] * vector[0] + pose[3 + i] * vector[1] + pose[6 + i] * vector[2] for i in range(3)))

@@ -9,7 +9,7 @@ from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import flat, to_camera, types
+from mpcam.rendering.device import to_camera, types
 from mpcam.rendering.exclusive import exclusive
 
 MOST_LEVELS = 7
@@ -43,16 +43,16 @@ class VertexProjected(Buffered):
         self.corners = self.faces  # of the whole triangles
         self.faces = self.parts.faces(self.corners, mesh.triangle_count)
 
-    def place(self, vertices: Any) -> Any:
+    def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
         points = self.parts.points * self.mesh.triangle_count if self.level else dr.width(vertices) // 3
         number = dr.arange(types().UInt, points)
         dr.make_opaque(number)
-        target = dr.empty(types().Float, 3 * points)
+        target = dr.empty(types().Float, 4 * points)
         place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
         data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)
-        return place(number, target, self.parts.grid, *data)
+        return [place(number, target, self.parts.grid, *data)]
 
     def parent(self, triangle: Any) -> Any:
         import drjit as dr
@@ -91,7 +91,8 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
         depth = dr.norm(point) * unit if central else point.z
         # Behind a pinhole there is no image; beyond the rim of a disc there is one, marked by a negative depth.
         depth = dr.select(inside, depth, dr.nan if unbounded else -depth) if central else depth
-        return flat(target, types().Array3f(pixel.x, pixel.y, depth), number)
+        dr.scatter(target, types().Array4f(pixel.x, pixel.y, depth, 0), number)
+        return target
 
     return place
 

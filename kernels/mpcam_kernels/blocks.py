@@ -1,0 +1,161 @@
+"""Large triangles and blocks of pixels: which blocks each one may cover, and block by block which triangles.
+
+Coarse squares are looked at first, then the blocks in those that a triangle may cover. A block's list says of each of
+its triangles also which of the four parts of the block it may cover.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from mpcam_kernels import regions
+from mpcam_kernels.samples import BLOCK, COARSE, PART, Samples
+
+LANES_WANTED = 1 << 14  # the rows of a triangle's squares are shared among lanes until there are about so many
+LEAST_SHARE = 4
+BLOCKS = (COARSE // BLOCK) ** 2  # in a coarse square
+
+
+@dataclass(frozen=True)
+class Large:
+    """Large triangles: per item the region and the triangle's number (see `regions.pack`), per triangle the set-up."""
+
+    regions: list[Any]
+    setups: list[Any]
+    count: Any
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Items and the coarse squares that they may cover."""
+
+    items: Any
+    squares: Any
+    found: Any
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Items, blocks that they may cover, which parts of these, and the rank in the block's list.
+
+    counts: pairs of each block.
+    """
+
+    items: Any
+    blocks: Any
+    parts: Any
+    ranks: Any
+    found: Any
+    counts: Any
+
+
+@dataclass(frozen=True)
+class Lists:
+    """Block by block the items and their parts; where each list starts, and its length."""
+
+    items: Any
+    parts: Any
+    starts: Any
+    counts: Any
+
+
+def append(types: Any, test: Any, area: regions.Region, shape: Any, triangle: Any, active: Any, large: Large) -> None:
+    """Add triangles to the list."""
+    slot = dr.scatter_inc(large.count, types.UInt(0), active)
+    for target, row in zip(large.regions, regions.pack(types, area, triangle), strict=True):
+        dr.scatter(target, row, slot, active)
+    for target, row in zip(large.setups, test.pack(types, shape), strict=True):
+        dr.scatter(target, row, triangle, active)
+
+
+def set_up(types: Any, test: Any, large: Large, triangle: Any) -> Any:
+    """The set-up of triangles by number."""
+    return test.unpack([dr.gather(types.Array4f, row, triangle) for row in large.setups])
+
+
+def _unpacked(types: Any, test: Any, large: Large, item: Any) -> tuple[regions.Region, Any]:
+    """Region and set-up of items."""
+    area, triangle = regions.unpack(types, [dr.gather(types.Array4f, row, item) for row in large.regions])
+    return area, set_up(types, test, large, triangle)
+
+
+def share(items: int, columns: int, rows: int, most: int) -> int:
+    """Lanes for the rows of one triangle's squares, a power of two; one lane finds at most `most` of them."""
+    lanes = LEAST_SHARE
+    while lanes < rows and (lanes * items < LANES_WANTED or -(-rows // lanes) * columns > most):
+        lanes *= 2
+    return lanes
+
+
+def find_squares(
+    types: Any, test: Any, lanes: Any, per_item: int, samples: Samples, large: Large, columns: int, most: int
+) -> Squares:
+    """Coarse squares that may have a hit of an item. Those beyond `most` are counted, but not kept."""
+    item, first = lanes // per_item, types.Int(lanes % per_item)
+    area, shape = _unpacked(types, test, large, item)
+    bottom = (area.y1 + (COARSE - 1)) // COARSE
+    found = dr.zeros(types.UInt, 1)
+    dr.make_opaque(found)
+    result = Squares(dr.empty(types.UInt, most), dr.empty(types.UInt, most), found)
+    spans = area.spans(types)
+
+    def extent(row: Any) -> tuple[Any, Any]:
+        top, last = dr.maximum(row * COARSE, area.y0), dr.minimum(row * COARSE + COARSE, area.y1) - 1
+        start, stop = spans(top, last)
+        return start // COARSE, dr.select(start < stop, (stop + (COARSE - 1)) // COARSE, 0)
+
+    def body(column: Any, end: Any, row: Any) -> Any:
+        square = types.UInt(row * columns + column)
+        keep = (column < end) & test.may_hit(shape, *samples.coarse(types, square, column < end))
+        slot: Any = dr.scatter_inc(found, types.UInt(0), keep)
+        keep &= slot < most
+        dr.scatter(result.items, item, slot, keep)
+        dr.scatter(result.squares, square, slot, keep)
+        ended = column + 1 >= end
+        start, stop = extent(row + per_item)
+        return dr.select(ended, start, column + 1), dr.select(ended, stop, end), dr.select(ended, row + per_item, row)
+
+    row = area.y0 // COARSE + first
+    start, stop = extent(row)
+    dr.while_loop((start, stop, row), lambda column, end, row: row < bottom, body)
+    return result
+
+
+def find_pairs(
+    types: Any, test: Any, lanes: Any, samples: Samples, large: Large, grid: tuple[int, int], squares: Squares, most: int
+) -> Pairs:
+    """Blocks that may have a hit: a lane for each square and block in it. `most`: room for one of every lane."""
+    columns, rows = grid
+    number, k = lanes // BLOCKS, lanes % BLOCKS
+    item, square = (dr.gather(types.UInt, values, number) for values in (squares.items, squares.squares))
+    area, shape = _unpacked(types, test, large, item)
+    across, wide = COARSE // BLOCK, -(-columns * BLOCK // COARSE)
+    x, y = (square % wide) * across + k % across, (square // wide) * across + k // across
+    block, exists = y * columns + x, (x < columns) & (y < rows)
+    spans, bits = area.spans(types), types.UInt(0)
+    for part in range(4):
+        left = types.Int(x * BLOCK) + (part % 2) * PART
+        top = types.Int(y * BLOCK) + (part // 2) * PART
+        first, last = dr.maximum(top, area.y0), dr.minimum(top + PART, area.y1) - 1
+        start, stop = spans(first, last)
+        reached = exists & (first <= last) & (start < left + PART) & (stop > left) & (start < stop)
+        keep = reached & test.may_hit(shape, *samples.parts(types, block * 4 + part, exists))
+        bits |= dr.select(keep, types.UInt(1 << part), 0)
+    counts, found = dr.zeros(types.UInt, columns * rows), dr.zeros(types.UInt, 1)
+    dr.make_opaque(counts, found)
+    slot: Any = dr.scatter_inc(found, types.UInt(0), bits != 0)
+    rank = dr.scatter_inc(counts, block, bits != 0)
+    kept = [dr.empty(types.UInt, most) for _ in range(4)]
+    for target, value in zip(kept, (item, block, bits, rank), strict=True):
+        dr.scatter(target, value, slot, bits != 0)
+    return Pairs(*kept, found, counts)  # pyright: ignore[reportArgumentType]
+
+
+def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:
+    """Fill the lists, whose starts and counts are known."""
+    block, rank = dr.gather(types.UInt, pairs.blocks, lanes), dr.gather(types.UInt, pairs.ranks, lanes)
+    slot = dr.gather(types.UInt, lists.starts, block) + rank
+    dr.scatter(lists.items, dr.gather(types.UInt, pairs.items, lanes), slot)
+    dr.scatter(lists.parts, dr.gather(types.UInt, pairs.parts, lanes), slot)
+    return lists

@@ -1,0 +1,1 @@
+"""What views of a scene from one point are good for: environment maps, shadow maps, occlusion."""

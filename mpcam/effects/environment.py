@@ -1,0 +1,94 @@
+"""Environment maps: what is seen from one point, in all directions, as two paraboloid views (Gascuel et al. 2008)."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
+from mpcam.effects.vectors import as_vector, as_vectors
+from mpcam.errors import InputError
+from mpcam.geometry.scene import Scene
+from mpcam.rendering.device import opaque_zero, types
+from mpcam.rendering.exclusive import exclusive
+
+
+@dataclass(frozen=True)
+class DeviceEnvironment:
+    """An environment map in device memory, an argument for kernels.
+
+    texels: Float, 3 numbers per pixel, front view, then back view. size: pixels along a side.
+    """
+
+    texels: Any
+    size: int
+
+    def lookup(self, direction: Any) -> Any:
+        """Colours (Array3f) of world directions (Array3f, any length), bilinear."""
+        import drjit as dr
+
+        u, v, start = place(direction, dr.norm(direction), self.size)
+        colour = types().Array3f(0.0)
+        for column, row, weight in four_texels(u, v, self.size, self.size):
+            number = types().UInt(start + row * self.size + column)
+            colour += dr.gather(types().Array3f, self.texels, number) * weight
+        return colour
+
+
+class EnvironmentMap:
+    """Colours in all directions from one point.
+
+    position (3,): world. images: two (H, W, 3) float32 pictures, linear RGB: the half-space towards world +x, and that
+    towards -x, +z up. cameras: the two paraboloid cameras that they were taken with; each sees a little more than 180
+    degrees, and what lies in the corners beyond that means nothing.
+    """
+
+    def __init__(self, position: Any, images: tuple[np.ndarray, np.ndarray]):
+        self.position = as_vector(position, "position")
+        shapes = [np.shape(image) for image in images]
+        if len(shapes) != 2 or shapes[0] != shapes[1] or shapes[0] != (*shapes[0][:1] * 2, 3):
+            raise InputError(f"images have shapes {shapes}: give two pictures of one square size, (N, N, 3) each")
+        self.images = images
+        self.cameras = back_to_back(self.position, check_size(shapes[0][0]))
+
+    @functools.cached_property
+    @exclusive
+    def on_device(self) -> DeviceEnvironment:
+        """The map in device memory, with a `lookup` for kernels."""
+        flat = np.concatenate([np.asarray(image, np.float32).ravel() for image in self.images])
+        return DeviceEnvironment(types().Float(flat) + opaque_zero(), len(self.images[0]))
+
+    @exclusive
+    def lookup(self, directions: Any) -> np.ndarray:
+        """Colours (..., 3) float32 that arrive from world directions, bilinear between pixels.
+
+        directions (..., 3): away from the position, any length above 0. Raises InputError for other shapes, and for
+        directions that are zero or not finite.
+        """
+        unit = as_vectors(directions, "directions", unit=True)
+        if unit.size == 0:
+            return np.zeros(unit.shape, np.float32)
+        columns = np.ascontiguousarray(unit.reshape(-1, 3).T, np.float32)
+        colour = self.on_device.lookup(types().Array3f(columns))
+        return np.stack([np.asarray(part.numpy()) for part in colour], -1).reshape(unit.shape)
+
+    def __repr__(self) -> str:
+        size = len(self.images[0])
+        return f"EnvironmentMap(2 x {size}x{size}, position={self.position.tolist()})"
+
+
+def environment_map(
+    scene: Any, position: Any, size: int = 512, shading: str = "light", method: str = "invert", **settings: Any
+) -> EnvironmentMap:
+    """Colours of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
+
+    scene: a Scene, a Mesh or several meshes. position (3,): world, away from surfaces. size: pixels along a side of
+    each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.
+    """
+    from mpcam.rendering.methods import render
+
+    cameras = back_to_back(as_vector(position, "position"), check_size(size))
+    whole = Scene.of(scene)
+    front, back = (render(camera, whole, method, shading=shading, **settings) for camera in cameras)
+    return EnvironmentMap(position, (front, back))

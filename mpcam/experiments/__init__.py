@@ -1,0 +1,87 @@
+"""Experiments of the papers, run again: each measures, sets its figures beside the paper's and writes a page.
+
+`mpcam experiment NAME` runs one; from Python, `run(NAME)`.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mpcam.errors import InputError
+
+if TYPE_CHECKING:
+    from mpcam.comparison.progress import Progress
+    from mpcam.experiments.results import Report
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment's name, the module of this package that has its `run`, and what it measures, in one line."""
+
+    name: str
+    module: str
+    summary: str
+
+
+EXPERIMENTS = {
+    experiment.name: experiment
+    for experiment in (
+        Experiment(
+            "gascuel2008-table2",
+            "gascuel2008_table2",
+            "Gascuel et al. 2008, Table 2: cube and hemicube against one or two non-linear projections",
+        ),
+        Experiment(
+            "gascuel2008-table3",
+            "gascuel2008_table3",
+            "Gascuel et al. 2008, Table 3: overdraw and the cost of each step, by projection and bound",
+        ),
+        Experiment(
+            "gascuel2008-fig9",
+            "gascuel2008_fig9",
+            "Gascuel et al. 2008, Fig. 9: the pixels that each bound tests, as pictures",
+        ),
+        Experiment(
+            "gascuel2008-growth",
+            "gascuel2008_growth",
+            "Time and peak memory against the number of triangles and of pixels, next to ray tracing",
+        ),
+        Experiment(
+            "moving-scene",
+            "moving_scene",
+            "Rasterizing against rebuilding a tree and tracing, for moving and still scenes",
+        ),
+    )
+}
+
+
+def run(
+    name: str,
+    *,
+    repeats: int | None = None,
+    quick: bool = False,
+    output: str | Path | None = None,
+    progress: "Progress | None" = None,
+) -> "Report":
+    """Run an experiment and return what it found.
+
+    name: one of EXPERIMENTS. repeats: timed rounds, in place of the experiment's own number. quick: small images and
+    scenes and few rounds, to see that everything works; the figures mean little. output: a folder for tables (CSV,
+    JSON), plots, pictures and the page; written whole or not at all. progress: called as progress(done, total, what).
+    Raises InputError for unknown names, for repeats below 1, and for an unusable folder.
+    """
+    if name not in EXPERIMENTS:
+        raise InputError(f"experiment {name!r}: allowed are {', '.join(EXPERIMENTS)}")
+    if repeats is not None and repeats < 1:
+        raise InputError(f"repeats={repeats}: at least 1 timed round is needed")
+    if output is not None:
+        from mpcam.comparison.output import check_output
+
+        check_output(output)
+    report = import_module(f"mpcam.experiments.{EXPERIMENTS[name].module}").run(repeats, quick, progress)
+    if output is not None:
+        from mpcam.experiments.output import write
+
+        write(report, output)
+    return report

@@ -1,0 +1,96 @@
+"""The bounds that can be asked for, as the kernels want them: outlines of triangles from the rows of their corners."""
+
+from typing import Any
+
+from mpcam.cameras.outline import HIDDEN, Lens, without_lines
+from mpcam_kernels.regions import Outline
+
+ROWS = {"tight": 2, "quad": 1, "triangle": 1, "straight": 1}
+"""Rows of four numbers per vertex that each bound reads."""
+
+PIECES = {"triangle": 4}
+"""Most outlines of one triangle, where it is not one."""
+
+
+def tight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+    """By the tangents at the corners; the camera's rough box where these are not enough."""
+    import drjit as dr
+
+    points = [row[0].xyz for row in rows]
+    lenses = [Lens(row[1].x, row[1].y, row[1].z, row[0].w) for row in rows]
+    quick, sure = camera.local_outline(points, lenses)
+    kind = type(points[0].x)
+
+    def rough(a: Any, b: Any, c: Any, *_: Any) -> tuple[Any, ...]:
+        return _flat(kind, without_lines(camera.local_bound_rough(a, b, c)))
+
+    def keep(a: Any, b: Any, c: Any, *rest: Any) -> tuple[Any, ...]:
+        return rest
+
+    found = dr.if_stmt((*points, *_flat(kind, quick)), ~sure, rough, keep)
+    return [_nested(found)]
+
+
+def quad(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+    """The box of the quads around the curved edges."""
+    return [_kernel_outline(without_lines(camera.local_bound_quads(*(row[0].xyz for row in rows))))]
+
+
+def triangle(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+    """Up to four bounding triangles."""
+    pieces = camera.local_bound_triangles(*(row[0].xyz for row in rows))
+    return [Outline(piece.low, piece.high, piece.valid, piece.lines) for piece in pieces]
+
+
+def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+    """Straight-edged image triangles; without an image where a corner is not finite."""
+    import drjit as dr
+
+    a, b, c = (row[0].xyz for row in rows)
+    low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
+    area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+    lines = []
+    for p, q in ((a, b), (b, c), (c, a)):
+        step = q.xy - p.xy
+        length = dr.sqrt(dr.squared_norm(step))
+        # Far from the image, rounding of a corner moves a line by more than the pixel that it is to spare.
+        usable = (area != 0) & (length > 0) & (dr.abs(p.x) + dr.abs(p.y) + length < 1e5)
+        inverse = dr.select(area < 0, -1.0, 1.0) / dr.select(usable, length, 1.0)
+        u, v = -step.y * inverse, step.x * inverse
+        kept = (dr.select(usable, u, 0), dr.select(usable, v, 0), dr.select(usable, -(u * p.x + v * p.y), 1))
+        lines.append(type(a)(*kept))
+    finite = dr.isfinite(a.x + b.x + c.x + a.y + b.y + c.y + a.z + b.z + c.z)
+    return [Outline(low.xy, high.xy, finite, (lines[0], lines[1], lines[2]))]
+
+
+def hidden_by_lens(first: list[Any]) -> Any:
+    """Whether all corners lie in the convex region that no pixel sees."""
+    import drjit as dr
+
+    return dr.minimum(dr.minimum(first[0].w, first[1].w), first[2].w) >= HIDDEN
+
+
+def hidden_never(first: list[Any]) -> Any:
+    """For bounds that know it from the outline only."""
+    return first[0].w != first[0].w
+
+
+HIDDEN_TESTS = {"tight": hidden_by_lens}
+OUTLINES = {"tight": tight, "quad": quad, "triangle": triangle, "straight": straight}
+
+
+def _flat(kind: Any, outline: Any) -> tuple[Any, ...]:
+    """An outline as plain arrays, which a branch of a kernel can return."""
+    numbers = [*outline.low, *outline.high, *(n for line in outline.lines for n in line)]
+    return (*(kind(n) for n in numbers), outline.valid)
+
+
+def _nested(values: Any) -> Outline:
+    *_, valid = values
+    numbers = values[-14:-1]
+    lines = tuple(numbers[4 + 3 * k : 7 + 3 * k] for k in range(3))
+    return Outline(numbers[0:2], numbers[2:4], valid, lines)
+
+
+def _kernel_outline(outline: Any) -> Outline:
+    return Outline(outline.low, outline.high, outline.valid, outline.lines)
