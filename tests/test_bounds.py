@@ -69,7 +69,9 @@ def test_boxes_hold_in_float32_kernels(camera, quick):
 
 @pytest.mark.parametrize("size", [1e-3, 0.05, 0.3, 1.0])
 @pytest.mark.parametrize("precision", ["float64", "float32"])
-@pytest.mark.parametrize("name", ["paraboloid", "cosine_sphere", "equisolid", "equidistant", "paraboloid 270", "pinhole"])
+@pytest.mark.parametrize(
+    "name", ["paraboloid", "cosine_sphere", "equisolid", "equidistant", "paraboloid 270", "pinhole"]
+)
 def test_lines_of_outlines_hold_every_sampled_point(name, precision, size):
     """And they are there for small triangles, and touch them."""
     camera, rng = cameras(512)[name], np.random.default_rng(11)
@@ -154,6 +156,20 @@ def test_quads_hold_every_sampled_point(name):
     assert_holds(mp.Box(box.low.T, box.high.T, box.valid), low, high, seen, 1e-9)
     tight = camera.bound(corners)
     assert (box.high - box.low).prod(0)[seen].mean() > (tight.high - tight.low).prod(-1)[seen].mean()
+
+
+@pytest.mark.parametrize("name", ["paraboloid", "cosine_sphere"])
+def test_quads_of_small_triangles_are_small_in_float32(name):
+    """Short chords of large circles: their quads must not be lost to cancellation."""
+    camera = cameras(512)[name]
+    assert isinstance(camera, mp.Radial)
+    corners = triangles(500, seed=10)
+    corners[..., 2] = np.abs(corners[..., 2]) + 0.1
+    corners = corners[:, :1] + 1e-3 * (corners - corners[:, :1])
+    box = camera.local_bound_quads(*(types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)))
+    size = (np.asarray(box.high.numpy()) - np.asarray(box.low.numpy())).T
+    tight = camera.bound(corners)
+    assert (size < 2 * (tight.high - tight.low).max(-1, keepdims=True) + 0.05).all()
 
 
 def test_a_triangle_around_the_antipode_covers_the_rim():

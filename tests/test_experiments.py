@@ -75,7 +75,8 @@ def test_table2(tmp_path):
     ratios, times = report.table("ratios"), report.table("times")
     assert len(ratios.rows) == 4 and len(times.rows) == 6
     assert max(row["wrong_percent"] for row in ratios.rows) <= 0.02
-    assert ratios.row(views="2 paraboloids", size=16)["color_paper_ratio"] == pytest.approx(8.8 / 3.4)
+    both = ratios.row(views="2 paraboloids", size=16)
+    assert both["color_paper_ratio"] == pytest.approx(8.8 / 3.4)
     assert ratios.row(views="1 Lambert", size=16)["pixel_ratio"] == 3
     for row in times.rows:
         assert all(0 < row[f"{output}_ms"] < 1e4 for output in table2.OUTPUTS)
@@ -88,7 +89,8 @@ def test_the_sets_of_views_see_the_same_surroundings():
     np.testing.assert_allclose(eyes, np.broadcast_to(scene.camera.eye, eyes.shape), atol=1e-9)
     front, back = (np.asarray(camera.camera_from_world)[:3, :3] for camera in views["2 paraboloids"])
     np.testing.assert_allclose(front[2], -back[2], atol=1e-12)
-    assert [(c.width, c.height) for c in views["5 hemicube faces"]] == [(48, 48), (24, 48), (24, 48), (48, 24), (48, 24)]
+    sizes = [(camera.width, camera.height) for camera in views["5 hemicube faces"]]
+    assert sizes == [(48, 48), (24, 48), (24, 48), (48, 24), (48, 24)]
 
 
 def test_a_hemicube_unfolds_without_seams():

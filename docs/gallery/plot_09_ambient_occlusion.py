@@ -18,7 +18,7 @@ import mpcam as mp
 radius, distance = 0.5, 1.3
 placed = np.diag([radius, radius, radius, 1.0])
 placed[2, 3] = distance
-ball = mp.builtin_mesh("sphere", triangles=327_680).transformed(placed)
+ball = mp.builtin_mesh("sphere", triangles=81_920).transformed(placed)
 sizes = np.array([8, 16, 32, 64, 128, 256])
 angles = np.linspace(0, 1.1, 12)
 errors = []
@@ -33,9 +33,9 @@ for size in sizes:
 # Ambient occlusion is the rest: 1 under a free sky, 0 in a closed box. Here it is worked
 # out at the vertices, once for each weight, and becomes a vertex colour. Elements are
 # moved off the surface by 1e-5 of the mesh's size, so as not to see their own face.
-floor = mp.builtin_mesh("plane", triangles=2 * 56**2).transformed(np.diag([4, 4, 1, 1]))
-box = mp.builtin_mesh("cube", triangles=12 * 8**2).flat()
-body = mp.builtin_mesh("sphere", triangles=1280)
+floor = mp.builtin_mesh("plane", triangles=2 * 40**2).transformed(np.diag([3, 3, 1, 1]))
+box = mp.builtin_mesh("cube", triangles=12 * 6**2).flat()
+body = mp.builtin_mesh("sphere", triangles=320)
 body = mp.Mesh(body.vertices, body.faces, normals=body.vertices)
 
 
@@ -45,8 +45,9 @@ def moved(mesh, size, x, y):
     return mesh.transformed(matrix)
 
 
-parts = [floor, moved(box, 0.35, 0.45, 0.35), moved(body, 0.38, -0.5, -0.25)]
-mesh = mp.Mesh.concatenate([*parts, moved(body, 0.2, 0.35, -0.55)])
+parts = [moved(box, 0.32, 0.5, 0.45), moved(body, 0.38, -0.45, 0.1)]
+parts += [moved(body, 0.17, 0.3, -0.45)]
+mesh = mp.Mesh.concatenate([floor, *parts])
 baked = {
     weight: mp.ambient_occlusion(mesh, mesh.vertices, mesh.normals, 32, weight)
     for weight in ("cosine", "uniform")
@@ -54,9 +55,8 @@ baked = {
 for weight, open_share in baked.items():
     print(f"{weight:8s} {len(open_share)} vertices, mean {open_share.mean():.3f}")
 
-camera = mp.Radial.equidistant(
-    420, 420, mp.look_at((-0.9, -1.9, 1.3), (0, -0.05, 0.2)), fov=1.3
-)
+pose = mp.look_at((-0.5, -1.9, 1.0), (0, 0, 0.2))
+camera = mp.Radial.equidistant(420, 420, pose, fov=1.5, radius=300)
 figure, axes = plt.subplots(1, 3, figsize=(7.6, 2.6))
 for one, (weight, open_share) in zip(axes, baked.items(), strict=False):
     coloured = mp.Mesh(
@@ -67,7 +67,7 @@ for one, (weight, open_share) in zip(axes, baked.items(), strict=False):
     )
     image = mp.render(camera, coloured, shading="color")
     seen = mp.rasterize(camera, coloured).mask
-    one.imshow(np.dstack([np.clip(image, 0, 1) ** (1 / 2.2), seen]))
+    one.imshow(np.dstack([np.clip(image, 0, 1), seen]))
     one.set_title(f'weight="{weight}"')
     one.set_axis_off()
 axes[2].loglog(sizes, errors, "o-", label="form factor of a ball")

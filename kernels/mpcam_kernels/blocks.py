@@ -153,9 +153,11 @@ def find_pairs(
 
 
 def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:
-    """Fill the lists, whose starts and counts are known."""
-    block, rank = dr.gather(types.UInt, pairs.blocks, lanes), dr.gather(types.UInt, pairs.ranks, lanes)
-    slot = dr.gather(types.UInt, lists.starts, block) + rank
-    dr.scatter(lists.items, dr.gather(types.UInt, pairs.items, lanes), slot)
-    dr.scatter(lists.parts, dr.gather(types.UInt, pairs.parts, lanes), slot)
+    """Fill the lists, whose starts and counts are known; there may be more lanes than pairs."""
+    active = lanes < dr.gather(types.UInt, pairs.found, 0)
+    columns = (pairs.items, pairs.blocks, pairs.parts, pairs.ranks)
+    item, block, parts, rank = (dr.gather(types.UInt, column, lanes, active) for column in columns)
+    slot = dr.gather(types.UInt, lists.starts, block, active) + rank
+    dr.scatter(lists.items, item, slot, active)
+    dr.scatter(lists.parts, parts, slot, active)
     return lists

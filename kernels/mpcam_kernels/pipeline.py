@@ -17,6 +17,7 @@ import drjit as dr
 
 from mpcam_kernels import blocks, pixels, walk
 from mpcam_kernels.frozen import frozen
+from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.regions import Outline, region
 from mpcam_kernels.samples import COARSE, PIXELS, Samples
@@ -91,7 +92,7 @@ class Pipeline:
             buffer = dr.zeros(self.output.kind(types), self.places)
             dr.eval(buffer)
             return buffer, counters
-        triangles = self._lanes(0, dr.width(faces) // 3)
+        triangles = lanes(types, 0, dr.width(faces) // 3)
         room = 4 * dr.width(triangles)
         lists = [
             [dr.empty(types.Float, room * self.pieces) for _ in range(3)],
@@ -106,17 +107,17 @@ class Pipeline:
         start, chunk = 0, min(total, LANES)
         while start < total:
             chunk = min(chunk, total - start)
-            squares = self._find(self._lanes(start, start + chunk), per_item, samples, large)
+            squares = self._find(lanes(types, start, start + chunk), per_item, samples, large)
             needed = squares.found[0] * blocks.BLOCKS
             if needed > PAIRS and chunk > 1:
                 chunk = max(1, chunk // (1 + needed // PAIRS))
                 continue
             if needed:
-                pairs = self._refine(self._lanes(0, needed), samples, large, squares)
-                found = pairs.found[0]
-                room = [dr.empty(types.UInt, max(found, 1)) for _ in range(2)]
+                candidates = lanes(types, 0, needed)
+                pairs = self._refine(candidates, samples, large, squares)
+                room = [dr.empty(types.UInt, needed) for _ in range(2)]
                 lists = blocks.Lists(*room, dr.prefix_sum(pairs.counts), pairs.counts)
-                lists = self._list(self._lanes(0, found), pairs, lists) if found else lists
+                lists = self._list(candidates, pairs, lists)
                 if done:
                     done("lists", lists)
                 buffer, counters = self._pixels(samples, large, lists, buffer, counters)
@@ -124,11 +125,6 @@ class Pipeline:
                     done("pixels", buffer)
             start += chunk
         return buffer, counters
-
-    def _lanes(self, first: int, last: int) -> Any:
-        lanes = dr.arange(self.types.UInt, first, last)
-        dr.make_opaque(lanes)
-        return lanes
 
     def _triangle_pass(
         self,

@@ -32,7 +32,7 @@ from mpcam.geometry.scene import Scene
 from mpcam.rendering.methods import prepare, rasterize
 from mpcam.rendering.shade import shade_device
 
-SIZE, TINY, ROUNDS = 512, 8, 11
+SIZE, TINY, ROUNDS = 512, 8, 9
 PROJECTIONS = {
     "linear": "pinhole",
     "cosine sphere": "cosine_sphere",

@@ -46,9 +46,10 @@ class VertexProjected(Buffered):
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
+        from mpcam_kernels.lanes import lanes
+
         points = self.parts.points * self.mesh.triangle_count if self.level else dr.width(vertices) // 3
-        number = dr.arange(types().UInt, points)
-        dr.make_opaque(number)
+        number = lanes(types(), 0, points)
         target = dr.empty(types().Float, 4 * points)
         place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
         data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)
