@@ -1,7 +1,7 @@
 """Large triangles and blocks of pixels: which blocks each one may cover, and block by block which triangles.
 
 Coarse squares are looked at first, then the blocks in those that a triangle may cover. A block's list says of each of
-its triangles also which of the four parts of the block it may cover.
+its triangles also which parts of the block it may cover.
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
-from mpcam_kernels.samples import BLOCK, COARSE, PART, Samples
+from mpcam_kernels.samples import COARSE, HEIGHT, PART, PARTS, WIDTH, Samples
 
 LANES_WANTED = 1 << 14  # the rows of a triangle's squares are shared among lanes until there are about so many
 LEAST_SHARE = 4
-BLOCKS = (COARSE // BLOCK) ** 2  # in a coarse square
+BLOCKS = COARSE // HEIGHT  # in a coarse square, above each other
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Squares:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Items, blocks that they may cover, which parts of these, and the rank in the block's list.
+    """Names of triangles, blocks that they may cover, which parts of these, and the rank in the block's list.
 
     counts: pairs of each block.
     """
 
-    items: Any
+    names: Any
     blocks: Any
     parts: Any
     ranks: Any
@@ -52,10 +52,9 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Lists:
-    """Block by block the items and their parts; where each list starts, and its length."""
+    """Block by block the names of triangles and the parts of the block, in pairs; where lists start, their lengths."""
 
-    items: Any
-    parts: Any
+    entries: Any
     starts: Any
     counts: Any
 
@@ -74,10 +73,10 @@ def set_up(types: Any, test: Any, large: Large, triangle: Any) -> Any:
     return test.unpack([dr.gather(types.Array4f, row, triangle) for row in large.setups])
 
 
-def _unpacked(types: Any, test: Any, large: Large, item: Any) -> tuple[regions.Region, Any]:
-    """Region and set-up of items."""
+def _unpacked(types: Any, test: Any, large: Large, item: Any) -> tuple[regions.Region, Any, Any]:
+    """Region, triangle and set-up of items."""
     area, triangle = regions.unpack(types, [dr.gather(types.Array4f, row, item) for row in large.regions])
-    return area, set_up(types, test, large, triangle)
+    return area, triangle, set_up(types, test, large, triangle)
 
 
 def share(items: int, columns: int, rows: int, most: int) -> int:
@@ -93,7 +92,7 @@ def find_squares(
 ) -> Squares:
     """Coarse squares that may have a hit of an item. Those beyond `most` are counted, but not kept."""
     item, first = lanes // per_item, types.Int(lanes % per_item)
-    area, shape = _unpacked(types, test, large, item)
+    area, _, shape = _unpacked(types, test, large, item)
     bottom = (area.y1 + (COARSE - 1)) // COARSE
     found = dr.zeros(types.UInt, 1)
     dr.make_opaque(found)
@@ -123,31 +122,41 @@ def find_squares(
 
 
 def find_pairs(
-    types: Any, test: Any, lanes: Any, samples: Samples, large: Large, grid: tuple[int, int], squares: Squares, most: int
+    types: Any,
+    test: Any,
+    lanes: Any,
+    samples: Samples,
+    large: Large,
+    grid: tuple[int, int],
+    squares: Squares,
+    most: int,
+    by_item: bool,
 ) -> Pairs:
-    """Blocks that may have a hit: a lane for each square and block in it. `most`: room for one of every lane."""
+    """Blocks that may have a hit: a lane for each square and block in it. `most`: room for one of every lane.
+
+    by_item: name triangles by their item, else by their own number.
+    """
     columns, rows = grid
     number, k = lanes // BLOCKS, lanes % BLOCKS
     item, square = (dr.gather(types.UInt, values, number) for values in (squares.items, squares.squares))
-    area, shape = _unpacked(types, test, large, item)
-    across, wide = COARSE // BLOCK, -(-columns * BLOCK // COARSE)
-    x, y = (square % wide) * across + k % across, (square // wide) * across + k // across
-    block, exists = y * columns + x, (x < columns) & (y < rows)
+    area, triangle, shape = _unpacked(types, test, large, item)
+    x, y = square % columns, (square // columns) * BLOCKS + k
+    block, exists = y * columns + x, y < rows
     spans, bits = area.spans(types), types.UInt(0)
-    for part in range(4):
-        left = types.Int(x * BLOCK) + (part % 2) * PART
-        top = types.Int(y * BLOCK) + (part // 2) * PART
+    for part in range(PARTS):
+        left = types.Int(x * WIDTH) + (part % 4) * PART
+        top = types.Int(y * HEIGHT) + (part // 4) * PART
         first, last = dr.maximum(top, area.y0), dr.minimum(top + PART, area.y1) - 1
         start, stop = spans(first, last)
         reached = exists & (first <= last) & (start < left + PART) & (stop > left) & (start < stop)
-        keep = reached & test.may_hit(shape, *samples.parts(types, block * 4 + part, exists))
+        keep = reached & test.may_hit(shape, *samples.parts(types, block * PARTS + part, exists))
         bits |= dr.select(keep, types.UInt(1 << part), 0)
     counts, found = dr.zeros(types.UInt, columns * rows), dr.zeros(types.UInt, 1)
     dr.make_opaque(counts, found)
     slot: Any = dr.scatter_inc(found, types.UInt(0), bits != 0)
     rank = dr.scatter_inc(counts, block, bits != 0)
     kept = [dr.empty(types.UInt, most) for _ in range(4)]
-    for target, value in zip(kept, (item, block, bits, rank), strict=True):
+    for target, value in zip(kept, (item if by_item else triangle, block, bits, rank), strict=True):
         dr.scatter(target, value, slot, bits != 0)
     return Pairs(*kept, found, counts)  # pyright: ignore[reportArgumentType]
 
@@ -155,9 +164,8 @@ def find_pairs(
 def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:
     """Fill the lists, whose starts and counts are known; there may be more lanes than pairs."""
     active = lanes < dr.gather(types.UInt, pairs.found, 0)
-    columns = (pairs.items, pairs.blocks, pairs.parts, pairs.ranks)
-    item, block, parts, rank = (dr.gather(types.UInt, column, lanes, active) for column in columns)
+    columns = (pairs.names, pairs.blocks, pairs.parts, pairs.ranks)
+    name, block, parts, rank = (dr.gather(types.UInt, column, lanes, active) for column in columns)
     slot = dr.gather(types.UInt, lists.starts, block, active) + rank
-    dr.scatter(lists.items, item, slot, active)
-    dr.scatter(lists.parts, parts, slot, active)
+    dr.scatter(lists.entries, types.Array2u(name, parts), slot, active)
     return lists

@@ -1,9 +1,9 @@
 """Nearest triangle of every pixel, by bounding each curved triangle and inverting per pixel; no rays are traced.
 
 One pass over the triangles outlines each image by a box and three lines. Triangles with few pixels inside are finished
-there: their lane walks the spans between the lines. The others are listed by block of 8 x 8 pixels, with the parts
+there: their lane walks the spans between the lines. The others are listed by block of 16 x 8 pixels, with the parts
 of 4 x 4 that they may cover; blocks and parts outside of the lines, and those that one edge excludes, are dropped. Then
-each lane takes four pixels through their block's list with the nearest in registers. The result does not depend on the
+each lane takes eight pixels through their block's list with the nearest in registers. The result does not depend on the
 order of execution.
 
 The kernels know arrays and functions only: `outline` bounds a triangle's image, `test` is `central`, `planar` or
@@ -115,8 +115,7 @@ class Pipeline:
             if needed:
                 candidates = lanes(types, 0, needed)
                 pairs = self._refine(candidates, samples, large, squares)
-                room = [dr.empty(types.UInt, needed) for _ in range(2)]
-                lists = blocks.Lists(*room, dr.prefix_sum(pairs.counts), pairs.counts)
+                lists = blocks.Lists(dr.empty(types.UInt, 2 * needed), dr.prefix_sum(pairs.counts), pairs.counts)
                 lists = self._list(candidates, pairs, lists)
                 if done:
                     done("lists", lists)
@@ -176,7 +175,7 @@ class Pipeline:
 
     def _refine_pass(self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares) -> blocks.Pairs:
         grid = (self.columns, self.rows)
-        return blocks.find_pairs(self.types, self._picker, lanes, samples, large, grid, squares, PAIRS)
+        return blocks.find_pairs(self.types, self._picker, lanes, samples, large, grid, squares, PAIRS, self.bounded)
 
     def _list_pass(self, lanes: Any, pairs: blocks.Pairs, lists: blocks.Lists) -> blocks.Lists:
         return blocks.list_pairs(self.types, lanes, pairs, lists)

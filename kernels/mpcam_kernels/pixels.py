@@ -1,14 +1,17 @@
-"""Pixels through the lists of their blocks: the nearest surface in registers, four neighbouring pixels a lane."""
+"""Pixels through the lists of their blocks: the nearest surface in registers, eight neighbouring pixels a lane."""
 
+import functools
+import operator
 from typing import Any
 
 import drjit as dr
 
 from mpcam_kernels import regions
 from mpcam_kernels.blocks import Large, Lists, set_up
-from mpcam_kernels.samples import PIXELS, Samples, pixel_of
+from mpcam_kernels.samples import PARTS, PIXELS, Samples, pixel_of
 
-PER_LANE = 4  # pixels of a lane: a set-up that is gathered serves four tests in registers
+PER_LANE = 8  # pixels of a lane, two rows of a part: a set-up that is gathered serves eight tests in registers
+FOURS = PER_LANE // 4
 
 
 def through_lists(
@@ -29,33 +32,36 @@ def through_lists(
     """
     lane = dr.arange(types.UInt, dr.width(buffer) // PER_LANE)
     place = lane * PER_LANE
-    block, part = place // PIXELS, (place >> 4) & 3
-    groups = [dr.gather(types.Array4f, component, lane) for component in samples.pixels]
-    views = [type(samples.pixels)(*(group[k] for group in groups)) for k in range(PER_LANE)]
-    x, y, _ = pixel_of(types, place, *size)
+    block, part = place // PIXELS, (place >> 4) % PARTS
     four = types.Array4u64 if output.kind(types) is types.UInt64 else types.Array4u
-    before = dr.gather(four, buffer, lane)
+    fours = [lane * FOURS + k for k in range(FOURS)]
+    groups = [[dr.gather(types.Array4f, component, at) for component in samples.pixels] for at in fours]
+    views = [type(samples.pixels)(*(component[k] for component in group)) for group in groups for k in range(4)]
+    before = [key for at in fours for key in dr.gather(four, buffer, at)]
+    x, y, _ = pixel_of(types, place, *size)
     start = dr.gather(types.UInt, lists.starts, block)
     end = start + dr.gather(types.UInt, lists.counts, block)
 
     def allowed(number: Any, mask: Any) -> list[Any]:
-        """Which pixels of the lane are in the region of an item."""
+        """Which pixels of the lane to test against a triangle."""
         if not bounded:
             return [mask] * PER_LANE
         area, _ = regions.unpack(types, [dr.gather(types.Array4f, row, number) for row in large.regions])
-        row = types.Int(y)
-        first, last = area.spans(types)(row, row)
-        inside = (row >= area.y0) & (row < area.y1)
-        return [inside & (types.Int(x + k) >= first) & (types.Int(x + k) < last) for k in range(PER_LANE)]
+        inside = []
+        for k in range(PER_LANE):
+            column, row = types.Int(x + k % 4), types.Int(y + k // 4)
+            first, last = area.spans(types)(row, row)
+            inside.append((row >= area.y0) & (row < area.y1) & (column >= first) & (column < last))
+        return inside
 
     def tested(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        number = dr.gather(types.UInt, lists.items, index)
-        bits = dr.gather(types.UInt, lists.parts, index)
-        mask = ((bits >> part) & 1) != 0
-        triangle = dr.reinterpret_array(types.UInt, dr.gather(types.Float, large.regions[2], number * 4 + 3))
+        name, bits = dr.gather(types.Array2u, lists.entries, index)
+        mask, triangle = ((bits >> part) & 1) != 0, name
+        if bounded:
+            triangle = dr.reinterpret_array(types.UInt, dr.gather(types.Float, large.regions[2], name * 4 + 3))
         shape = set_up(types, test, large, triangle)
         nearest, first = [], []
-        for k, possible in enumerate(allowed(number, mask)):
+        for k, possible in enumerate(allowed(name, mask)):
             if output.depth:
                 covered, nearness = test.hit(shape, views[k])
                 covered = covered & possible
@@ -77,7 +83,7 @@ def through_lists(
         return *state, index + 1
 
     def unfinished(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        return (index < end) if output.depth else (index < end) & ~(best[0] & best[1] & best[2] & best[3])
+        return (index < end) if output.depth else (index < end) & ~functools.reduce(operator.and_, best)
 
     # A test of nearness 0 is no hit, but ties with nothing, which has it too: such an owner is masked below.
     owners = [output.triangle(types, key) for key in before] if hasattr(output, "triangle") else []
@@ -90,5 +96,12 @@ def through_lists(
     else:
         keys = [dr.select(one, types.UInt(1), 0) for one in best]
     result = dr.empty(type(buffer), dr.width(buffer))
-    dr.scatter(result, four(*keys), lane)
+
+    # One scatter in a loop: two to one array would be two kernels, each with all of the above.
+    def store(k: Any) -> Any:
+        chosen = [dr.select(k == 0, keys[i], keys[4 + i]) for i in range(4)]
+        dr.scatter(result, four(*chosen), lane * FOURS + k)
+        return (k + 1,)
+
+    dr.while_loop((types.UInt(0),), lambda k: k < FOURS, store)
     return result, tests, hits

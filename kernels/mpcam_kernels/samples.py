@@ -1,6 +1,6 @@
 """Per-pixel samples, kept block by block, and bounds of the blocks.
 
-Blocks of 8 x 8 pixels follow each other row by row. Within a block come its four parts of 4 x 4, and there the pixels
+Blocks of 16 x 8 pixels follow each other row by row. Within a block come its eight parts of 4 x 4, and there the pixels
 row by row: the pixels that one triangle covers lie close together in memory. Blocks at the right and lower border may
 hold places without a pixel.
 """
@@ -10,10 +10,11 @@ from typing import Any
 
 import drjit as dr
 
-BLOCK = 8  # pixels along a side of a block
-PART = 4  # of the parts of a block
-COARSE = 16  # of the squares of blocks that are looked at first
-PIXELS = BLOCK * BLOCK
+WIDTH, HEIGHT = 16, 8  # pixels of a block
+PART = 4  # pixels along a side of the parts of a block
+PARTS = WIDTH * HEIGHT // (PART * PART)
+COARSE = 16  # pixels along a side of the squares that are looked at first
+PIXELS = WIDTH * HEIGHT
 NOWHERE = -1e9  # image coordinate that no triangle covers
 
 
@@ -48,13 +49,13 @@ class Bounds:
 
 def blocks(width: int, height: int) -> tuple[int, int]:
     """Columns and rows of blocks in an image."""
-    return -(-width // BLOCK), -(-height // BLOCK)
+    return -(-width // WIDTH), -(-height // HEIGHT)
 
 
 def place(x: Any, y: Any, width: int) -> Any:
     """Place of a pixel in block order."""
-    block = (y // BLOCK) * (-(-width // BLOCK)) + x // BLOCK
-    part = ((y >> 2) & 1) * 2 + ((x >> 2) & 1)
+    block = (y // HEIGHT) * (-(-width // WIDTH)) + x // WIDTH
+    part = ((y >> 2) & 1) * 4 + ((x >> 2) & 3)
     return block * PIXELS + (part << 4) + ((y & 3) << 2) + (x & 3)
 
 
@@ -67,10 +68,9 @@ def places(types: Any, width: int, height: int) -> Any:
 def pixel_of(types: Any, index: Any, width: int, height: int) -> tuple[Any, Any, Any]:
     """Column and row of a place, and whether there is a pixel."""
     columns, _ = blocks(width, height)
-    block = index // PIXELS
-    part = (index >> 4) & 3
-    x = (block % columns) * BLOCK + ((part & 1) << 2) + (index & 3)
-    y = (block // columns) * BLOCK + ((part >> 1) << 2) + ((index >> 2) & 3)
+    block, part = index // PIXELS, (index >> 4) & 7
+    x = (block % columns) * WIDTH + ((part & 3) << 2) + (index & 3)
+    y = (block // columns) * HEIGHT + ((part >> 2) << 2) + ((index >> 2) & 3)
     return x, y, (x < width) & (y < height)
 
 
@@ -132,7 +132,7 @@ def _bounds(types: Any, pixels: Any, left: Any, top: Any, side: int, width: int)
 
     def sample(k: Any) -> tuple[Any, Any, Any, Any]:
         x, y = left + k % side, top + k // side
-        within = (x < -(-width // BLOCK) * BLOCK) & (place(x, y, width) <= last)
+        within = (x < -(-width // WIDTH) * WIDTH) & (place(x, y, width) <= last)
         s, t = (types.Float(k % side) - half) / half, (types.Float(k // side) - half) / half
         d = dr.gather(types.Array3f, pixels, place(x, y, width), within)
         return d, s, t, dr.squared_norm(d) > 0
