@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from mpcam.io.images import read_image as read_image
     from mpcam.io.images import write_image as write_image
     from mpcam.io.scenes import load_scene as load_scene
+    from mpcam.rendering.explain import Explanation as Explanation
+    from mpcam.rendering.explain import explain as explain
     from mpcam.rendering.hits import Hits as Hits
     from mpcam.rendering.interpolate import interpolate as interpolate
     from mpcam.rendering.maps import CoverageMap as CoverageMap
@@ -77,6 +79,7 @@ _HOMES = {
     "mpcam.io.calibration": "read_calibration write_calibration",
     "mpcam.io.images": "read_camera read_channels read_image write_image",
     "mpcam.io.scenes": "load_scene",
+    "mpcam.rendering.explain": "Explanation explain",
     "mpcam.rendering.hits": "Hits",
     "mpcam.rendering.interpolate": "interpolate",
     "mpcam.rendering.maps": "CoverageMap DepthMap coverage_map depth_map",

@@ -21,7 +21,9 @@ def directions(count: int, seed: int = 0) -> np.ndarray:
 def dome(colour) -> mp.Mesh:
     """A ball around CENTRE, of vertices coloured by their direction from it."""
     ball = mp.builtin_mesh("sphere", triangles=81_920)
-    return mp.Mesh(5 * ball.vertices + CENTRE, ball.faces, colors=colour(ball.vertices), materials=mp.Material((1, 1, 1)))
+    return mp.Mesh(
+        5 * ball.vertices + CENTRE, ball.faces, colors=colour(ball.vertices), materials=mp.Material((1, 1, 1))
+    )
 
 
 def linear(direction: np.ndarray) -> np.ndarray:

@@ -76,8 +76,7 @@ KINDS = ("ball", "solid angle", "tilted ball", "disc", "parallel", "perpendicula
 def error(kind: str, size: int) -> float:
     """Root mean square of the errors of a kind's cases."""
     found = [
-        mp.form_factor(mesh, ORIGIN, normal, size, weight=weight) - share
-        for mesh, normal, share, weight in cases(kind)
+        mp.form_factor(mesh, ORIGIN, normal, size, weight=weight) - share for mesh, normal, share, weight in cases(kind)
     ]
     return float(np.sqrt(np.mean(np.square(found))))
 

@@ -307,7 +307,10 @@ def lit(mesh, *lights) -> mp.Scene:
         (lambda c, m: mp.shadow_map(m, SUN).visible([(0, 1, 2)], (0, 0, 1)), r"normals have shape \(3,\) and points"),
         (lambda c, m: mp.shadow_map(m, SUN).visible((0, 1, 2), (0, 0, 0)), "normals is .*: give a direction"),
         (lambda c, m: mp.render(c, m, shadows=True), "shadows: the scene has no lights; give it a DirectionalLight"),
-        (lambda c, m: mp.render(c, lit(m, SUN), shadows=True, shading="normal"), "with shading='light', not with 'norm"),
+        (
+            lambda c, m: mp.render(c, lit(m, SUN), shadows=True, shading="normal"),
+            "with shading='light', not with 'norm",
+        ),
         (lambda c, m: mp.render(c, lit(m, SUN), shadows=True, shadow_size=1), "shadow_size=1: a whole number"),
         (lambda c, m: mp.shade(mp.rasterize(c, m), lit(m, SUN), shadows=[1]), "1 shadow maps that are not those of"),
         (

@@ -257,7 +257,7 @@ def test_one_pixel(method):
     ("call", "words"),
     [
         (lambda c, m: mp.rasterize(c, m, method="magic"), "allowed are invert, vertex"),
-        (lambda c, m: mp.rasterize(c, m, bound="loose"), "allowed are tight, quad"),
+        (lambda c, m: mp.rasterize(c, m, bound="loose"), "allowed are tight, triangle, quad"),
         (lambda c, m: mp.rasterize(c, m, level=2), "no setting 'level': allowed are bound"),
         (lambda c, m: mp.rasterize(c, m, method="raytrace", level=2), "allowed are none"),
         (lambda c, m: mp.rasterize(c, m, method="vertex", level=1.5), "whole number from 0 to 7"),

@@ -126,7 +126,8 @@ def test_third_party_imports_are_declared():
         ("mpcam/math", ("math", "errors")),
         ("mpcam/cameras", ("math", "errors", "cameras")),
         ("mpcam/geometry", ("math", "errors", "cameras", "geometry", "io")),
-        ("mpcam/rendering", ("math", "errors", "cameras", "geometry", "rendering", "truth", "doctor")),
+        ("mpcam/rendering", ("math", "errors", "cameras", "geometry", "rendering", "truth", "effects", "doctor")),
+        ("mpcam/effects", ("math", "errors", "cameras", "geometry", "rendering", "effects")),
         ("mpcam/truth", ("math", "errors", "cameras", "geometry", "rendering", "truth", "doctor")),
     ],
 )

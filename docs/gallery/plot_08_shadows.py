@@ -22,9 +22,7 @@ camera = day.camera
 # %%
 # By night: a lamp between the columns, and a little light from everywhere.
 lamp = mp.PointLight((2.5, -1.2, 2.2), (9.0, 6.5, 4.0))
-night = replace(
-    day, lights=(lamp,), ambient=(0.02, 0.025, 0.05), background=(0.01, 0.01, 0.03)
-)
+night = replace(day, lights=(lamp,), ambient=(0.02, 0.025, 0.05), background=(0.01, 0.01, 0.03))
 
 v, u = np.indices((512, 512)) + 0.5
 seen = camera.ray(np.stack([u, v], -1)).valid

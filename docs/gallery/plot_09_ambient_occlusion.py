@@ -49,8 +49,7 @@ parts = [moved(box, 0.32, 0.5, 0.45), moved(body, 0.38, -0.45, 0.1)]
 parts += [moved(body, 0.17, 0.3, -0.45)]
 mesh = mp.Mesh.concatenate([floor, *parts])
 baked = {
-    weight: mp.ambient_occlusion(mesh, mesh.vertices, mesh.normals, 32, weight)
-    for weight in ("cosine", "uniform")
+    weight: mp.ambient_occlusion(mesh, mesh.vertices, mesh.normals, 32, weight) for weight in ("cosine", "uniform")
 }
 for weight, open_share in baked.items():
     print(f"{weight:8s} {len(open_share)} vertices, mean {open_share.mean():.3f}")

@@ -155,10 +155,11 @@ def find_pairs(
     dr.make_opaque(counts, found)
     slot: Any = dr.scatter_inc(found, types.UInt(0), bits != 0)
     rank = dr.scatter_inc(counts, block, bits != 0)
-    kept = [dr.empty(types.UInt, most) for _ in range(4)]
-    for target, value in zip(kept, (item if by_item else triangle, block, bits, rank), strict=True):
+    names, numbers, parts, ranks = (dr.empty(types.UInt, most) for _ in range(4))
+    columns = ((names, item if by_item else triangle), (numbers, block), (parts, bits), (ranks, rank))
+    for target, value in columns:
         dr.scatter(target, value, slot, bits != 0)
-    return Pairs(*kept, found, counts)  # pyright: ignore[reportArgumentType]
+    return Pairs(names, numbers, parts, ranks, found, counts)
 
 
 def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:

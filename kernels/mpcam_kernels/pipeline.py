@@ -39,7 +39,8 @@ class Pipeline:
     surely not seen. test: module with setup, hit, inside, may_hit, pack and
     unpack. output: "hits", "depth" or "coverage". cull: "none", or "back" or "front" to leave out the triangles that
     turn this side to the eye. bounded: test all pixels inside of the outlines and none outside, as papers count them;
-    else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and hits.
+    else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and
+    hits.
     """
 
     def __init__(
@@ -138,7 +139,7 @@ class Pipeline:
         types, test = self.types, self.test
         buffer = dr.zeros(self.output.kind(types), self.places)
         dr.make_opaque(buffer)
-        large = blocks.Large(*lists, dr.zeros(types.UInt, 1))
+        large = blocks.Large(lists[0], lists[1], dr.zeros(types.UInt, 1))
         corners = dr.gather(types.Array3u, faces, triangle)
         first = [dr.gather(types.Array4f, vertices[0], corner) for corner in corners]
         points = [row.xyz for row in first]
@@ -148,7 +149,10 @@ class Pipeline:
             shown = shown & ((turn < 0) if self.cull == "back" else (turn > 0))
 
         def outlined(tests: Any, hits: Any) -> tuple[Any, Any]:
-            rows = [[row, *(dr.gather(types.Array4f, r, n) for r in vertices[1:])] for row, n in zip(first, corners, strict=True)]
+            rows = [
+                [row, *(dr.gather(types.Array4f, r, n) for r in vertices[1:])]
+                for row, n in zip(first, corners, strict=True)
+            ]
             for outline in self.outline(camera, rows):
                 area, seen = region(types, outline, self.width, self.height)
 

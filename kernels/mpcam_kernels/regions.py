@@ -48,7 +48,10 @@ class Region(NamedTuple):
             top, bottom = types.Float(first) + 0.5, types.Float(last) + 0.5
             for (_, b, c), tilt in zip(self.lines, tilts, strict=True):
                 end = dr.fma(c + dr.maximum(b * top, b * bottom), tilt, -0.5)
-                low, high = dr.select(tilt < 0, dr.maximum(low, end), low), dr.select(tilt > 0, dr.minimum(high, end), high)
+                low, high = (
+                    dr.select(tilt < 0, dr.maximum(low, end), low),
+                    dr.select(tilt > 0, dr.minimum(high, end), high),
+                )
             start = types.Int(dr.ceil(dr.minimum(low, highest + 1)))
             return start, types.Int(dr.floor(dr.maximum(high, lowest - 1))) + 1
 
@@ -79,7 +82,11 @@ def _range(types: Any, low: Any, high: Any, size: int) -> tuple[Any, Any]:
 
 def pack(types: Any, area: Region, triangle: Any) -> list[Any]:
     """A region and the number of its triangle, in three rows of four numbers."""
-    numbers = (types.UInt(area.x0) | (types.UInt(area.x1) << 16), types.UInt(area.y0) | (types.UInt(area.y1) << 16), triangle)
+    numbers = (
+        types.UInt(area.x0) | (types.UInt(area.x1) << 16),
+        types.UInt(area.y0) | (types.UInt(area.y1) << 16),
+        triangle,
+    )
     return [
         types.Array4f(*line, dr.reinterpret_array(types.Float, types.UInt(number)))
         for line, number in zip(area.lines, numbers, strict=True)
@@ -88,7 +95,7 @@ def pack(types: Any, area: Region, triangle: Any) -> list[Any]:
 
 def unpack(types: Any, rows: list[Any]) -> tuple[Region, Any]:
     """A region and the number of its triangle from its rows."""
-    columns, lines, triangle = (dr.reinterpret_array(types.UInt, row.w) for row in rows)
-    low, high = (columns & 0xFFFF, lines & 0xFFFF), (columns >> 16, lines >> 16)
-    area = Region(*(types.Int(n) for n in (*low, *high)), tuple(row.xyz for row in rows))  # pyright: ignore[reportArgumentType]
-    return area, triangle
+    numbers: list[Any] = [dr.reinterpret_array(types.UInt, row.w) for row in rows]
+    columns, lines, triangle = numbers
+    x0, y0, x1, y1 = (types.Int(n) for n in (columns & 0xFFFF, lines & 0xFFFF, columns >> 16, lines >> 16))
+    return Region(x0, y0, x1, y1, (rows[0].xyz, rows[1].xyz, rows[2].xyz)), triangle

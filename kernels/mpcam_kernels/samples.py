@@ -119,9 +119,9 @@ def _squares(types: Any, width: int, height: int) -> list[tuple[Any, Any, int, i
 def _flat(*rows: Any) -> Bounds:
     """Bounds from rows of four numbers."""
     empty = 0 * rows[0]
-    rows = [dr.ravel(row + empty) for row in rows]
-    dr.eval(rows)
-    return Bounds(rows)
+    flat = [dr.ravel(row + empty) for row in rows]
+    dr.eval(flat)
+    return Bounds(flat)
 
 
 def _bounds(types: Any, pixels: Any, left: Any, top: Any, side: int, width: int) -> Bounds:

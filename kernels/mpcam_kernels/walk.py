@@ -1,4 +1,4 @@
-"""Small triangles: a lane walks the pixels of a region row by row, and the nearest surface wins by an atomic maximum."""
+"""Small triangles: a lane walks the pixels of a region row by row; the nearest surface wins by an atomic maximum."""
 
 from typing import Any
 

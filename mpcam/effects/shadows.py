@@ -165,7 +165,9 @@ class ShadowMap:
         world = as_vectors(points, "points")
         across = None if normals is None else as_vectors(normals, "normals", unit=True)
         if across is not None and across.shape != world.shape:
-            raise InputError(f"normals have shape {across.shape} and points {world.shape}: give a normal for each point")
+            raise InputError(
+                f"normals have shape {across.shape} and points {world.shape}: give a normal for each point"
+            )
         if world.size == 0:
             return np.zeros(world.shape[:-1], bool)
         origin = world.reshape(-1, 3)[0]

@@ -50,7 +50,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     for bound in bounds:
         tested[bound], found[bound] = counts(camera, corners, bound)
         steps.done(f"counting pixels, {bound}")
-    rendered = found[bounds[-1]]
+    wasted = {bound: tested[bound] - found[bound] for bound in bounds}
     calls = {bound: one.frame for bound, one in prepared.items()}
     times = timing.measure(calls, count, WARMUP, on_call=steps.done)
     rows = []
@@ -80,9 +80,9 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
         subject=f"Gascuel et al. 2008, Fig. 9 · characters, {mesh.triangle_count:,} triangles · {size} × {size} pixels",
         reading=_reading(rows),
         parts=(
-            _gallery(linear, colors, {bound: accessed(hits[bound], tested, rendered, bound) for bound in bounds}, rows),
+            _gallery(linear, colors, {bound: accessed(hits[bound], wasted, bound) for bound in bounds}, rows),
             _table(tuple(rows)),
-            _plot(tested, rendered),
+            _plot(tested, found[bounds[-1]]),
         ),
         scene={"paper": PAPER, "scene": f"characters, {mesh.triangle_count:,} triangles (paper: Characters, 177 K)"},
         machine=machine(),
@@ -103,12 +103,11 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def accessed(hits: Any, tested: dict[str, np.ndarray], rendered: np.ndarray, bound: str) -> np.ndarray:
+def accessed(hits: Any, wasted: dict[str, np.ndarray], bound: str) -> np.ndarray:
     """The paper's false colours: red and green are the weights of the hit, blue how many tests were in vain.
 
     Blue goes by the logarithm, on one scale for all bounds.
     """
-    wasted = {name: np.maximum(count - rendered, 0) for name, count in tested.items()}
     most = max(float(np.percentile(count, 99.9)) for count in wasted.values())
     blue = np.clip(np.log1p(wasted[bound]) / np.log1p(max(most, 1.0)), 0, 1)
     weights = np.where(hits.mask[..., None], hits.barycentric, 0)

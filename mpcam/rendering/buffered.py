@@ -2,6 +2,7 @@
 
 import functools
 import importlib
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -106,14 +107,24 @@ class Buffered:
         positions = self.place(self.vertices) if self.mesh.triangle_count else [self.vertices]
         if done:
             done("vertices", positions)
-        return positions, self._run(positions, done, count=False)[0]
+        return positions, self.run(positions, done)[0]
 
     @exclusive
     def count(self, positions: Any) -> np.ndarray:
         """Tests and covered samples of a frame over placed vertices."""
-        return self._run(positions, None, count=True)[1].numpy()
+        return self.run(positions, count=True)[1].numpy()
 
-    def _run(self, positions: Any, done: Any, count: bool) -> tuple[Any, Any]:
+    @property
+    def triangle_count(self) -> int:
+        """Triangles that the kernels see: those of the mesh, or their parts."""
+        import drjit as dr
+
+        return dr.width(self.faces) // 3
+
+    def run(
+        self, positions: list[Any], done: Callable[[str, Any], None] | None = None, count: bool = False
+    ) -> tuple[Any, Any]:
+        """Keys of all places over placed vertices, and counters or None; done(stage, arrays) is told of each stage."""
         from mpcam_kernels.backend import backend_name
 
         camera, model, static = None, None, ()
@@ -122,9 +133,7 @@ class Buffered:
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         size = (self.camera.width, self.camera.height)
         outline = self.bound if self.curved else "straight"
-        kernels = _pipeline(
-            self.test, outline, self.output, self.cull, model, static, *size, count, backend_name()
-        )
+        kernels = _pipeline(self.test, outline, self.output, self.cull, model, static, *size, count, backend_name())
         return kernels.frame(camera, positions, self.faces, self.samples, done)
 
     @exclusive

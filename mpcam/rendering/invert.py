@@ -20,16 +20,14 @@ class Inverted(Buffered):
     Central cameras test rays through one point; parallel rays are straight in the image plane and are tested there.
     bound: "tight" takes a box and three lines from the tangents at the corners (a box from the bounding cone where
     edges turn much) and drops what one edge excludes; "triangle" tests every pixel in one to four bounding triangles
-    (Gascuel et al. 2008, 3.3), "quad" every pixel in the box of the quads around the curved edges (3.4). output: "hits",
-    "depth" or "coverage". cull: "none", or "back" or "front": triangles that turn this side to the eye are left out;
-    corners run counter-clockwise seen from the front.
+    (Gascuel et al. 2008, 3.3), "quad" every pixel in the box of the quads around the curved edges (3.4). output:
+    "hits", "depth" or "coverage". cull: "none", or "back" or "front": triangles that turn this side to the eye are
+    left out; corners run counter-clockwise seen from the front.
     """
 
     method = "invert"
 
-    def __init__(
-        self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"
-    ):
+    def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"):
         if bound not in BOUNDS:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
         if cull not in CULLS:

@@ -1,5 +1,6 @@
 """The methods by name, and the two calls that most users need: `rasterize` and `render`."""
 
+import sys
 from typing import Any, Protocol
 
 import numpy as np
@@ -37,10 +38,10 @@ def prepare(
     """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
 
     output: what frames hold: "hits", or with method "invert" less and faster: "depth" (a DepthMap) or "coverage" (a
-    CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad") and `cull` ("none",
-    "back" or "front": the sides of triangles that are not shown; corners run counter-clockwise in front); `level` (0 to 7) for vertex; `resolution` (pixels
-    per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown methods and settings, and where
-    a method cannot serve the camera.
+    CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad") and `cull` ("none", "back" or "front":
+    the side of triangles that is not shown; corners run counter-clockwise in front); `level` (0 to 7) for vertex;
+    `resolution` (pixels per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown methods
+    and settings, and where a method cannot serve the camera.
     """
     if not isinstance(camera, Camera):
         raise InputError(
@@ -104,6 +105,7 @@ def render(
     shading: str = "light",
     shadows: bool = False,
     shadow_size: int = 1024,
+    explain: bool = False,
     **settings: Any,
 ) -> np.ndarray:
     """An image: (H, W, 3) float32, linear RGB.
@@ -111,9 +113,15 @@ def render(
     scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
     shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
-    frames of a still scene, make the maps once and give them to `shade`. Raises InputError.
+    frames of a still scene, make the maps once and give them to `shade`. explain: print to standard error which stages
+    run, which are left out and why (see `mpcam.explain`). Raises InputError.
     """
     whole = Scene.of(scene)
+    if explain:
+        from mpcam.rendering.explain import explain as explained
+
+        found = explained(camera, whole, method, shading=shading, shadows=shadows, **settings)
+        sys.stderr.write(f"{found}\n")
     maps: Any = ()
     if shadows:
         from mpcam.effects.shadows import shadow_maps

@@ -101,8 +101,7 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequen
     InputError for another shading, a scene whose mesh the hits do not belong to, and shadow maps of other lights.
     """
     whole = Scene.of(hits.mesh if scene is None else scene)
-    if shading not in SHADINGS:
-        raise InputError(f"shading={shading!r}: allowed are {', '.join(SHADINGS)}")
+    check_shading(shading)
     if whole.mesh.triangle_count != hits.mesh.triangle_count:
         raise InputError(
             f"the scene has {whole.mesh.triangle_count} triangles and the hits are on {hits.mesh.triangle_count}: "
@@ -111,6 +110,12 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequen
     _check_shadows(shadows, whole, shading)
     colour = shade_device(hits, whole, shading, shadows)
     return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
+
+
+def check_shading(shading: str) -> None:
+    """See that there is such a shading."""
+    if shading not in SHADINGS:
+        raise InputError(f"shading={shading!r}: allowed are {', '.join(SHADINGS)}")
 
 
 def check_shadow_shading(shading: str) -> None:
