@@ -1,6 +1,7 @@
 """Shadow maps: against traced rays, against plane geometry, and in the shading kernel."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,16 +62,14 @@ class View:
         image = np.full(self.mask.shape, -1)
         image[self.mask] = self.truth
         edge = np.zeros(image.shape, bool)
-        for one, other in (
-            (np.s_[1:], np.s_[:-1]),
-            (np.s_[:, 1:], np.s_[:, :-1]),
-        ):
-            changes = (image[one] != image[other]) & (image[one] >= 0) & (image[other] >= 0)
-            edge[one] |= changes
-            edge[other] |= changes
+        for one, other in ((image, edge), (image.T, edge.T)):
+            changes = (one[1:] != one[:-1]) & (one[1:] >= 0) & (one[:-1] >= 0)
+            other[1:] |= changes
+            other[:-1] |= changes
         pixel = PI / image.shape[1] * self.hits.depth[self.mask]
         reach = 1.5 + 1.5 * self.texel / np.maximum(self.cosine, 0.05) / pixel
-        return distance_transform_edt(~edge)[self.mask] <= reach
+        distance: Any = distance_transform_edt(~edge)
+        return distance[self.mask] <= reach
 
     def wrong(self, visible: np.ndarray) -> tuple[float, float]:
         """Share of the pixels that differ from the truth, of all and of those that are not near an edge."""

@@ -1,4 +1,4 @@
-"""Large triangles cut into blocks, by the kernels' own tests."""
+"""Large triangles cut into parts of blocks, as the kernels list them."""
 
 import functools
 
@@ -10,62 +10,91 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import mpcam as mp
-from mpcam.cameras.outline import outline
-from mpcam.rendering.device import lens, types
-from mpcam_kernels import central
-from mpcam_kernels.pipeline import BLOCK
+from mpcam.rendering.device import types
+from mpcam.rendering.outlines import hidden_by_lens, tight
+from mpcam_kernels import central, regions
+from mpcam_kernels.pipeline import Pipeline
+from mpcam_kernels.samples import HEIGHT, PART, PARTS, WIDTH
 
 SIZE = 160
 CAMERA = mp.Radial.paraboloid(SIZE, SIZE)
 TRIANGLES = {
-    "bounded by tangents": np.array([[-0.7, 0.55, 0.45], [-0.2, 1.0, 0.45], [-0.15, 0.5, 0.9]]),
-    "bounded by a sector": np.array([[-2.0, -1.4, 1.0], [1.3, -0.9, 0.8], [0.4, 2.6, 0.7]]),
+    "an outline with lines": np.array([[-0.7, 0.55, 0.45], [-0.2, 1.0, 0.45], [-0.15, 0.5, 0.9]]),
+    "the box of a sector": np.array([[-2.0, -1.4, 1.0], [1.3, -0.9, 0.8], [0.4, 2.6, 0.7]]),
 }
+OUTSIDE, DROPPED, TESTED, HIT = range(4)
+
+
+def listed(mesh):
+    """What the kernels find of a mesh of one large triangle: its region, and the numbers of the parts to test."""
+    t, prepared = types(), mp.prepare(CAMERA, mesh)
+    kernels = Pipeline(t, tight, hidden_by_lens, central, (SIZE, SIZE))
+    found = {}
+    positions = prepared.place(prepared.vertices)
+    kernels.frame(prepared.lens.on_device, positions, prepared.faces, prepared.samples, found.setdefault)
+    rows = [dr.gather(t.Array4f, row, t.UInt(0)) for row in found["triangles"][1].regions]
+    lists = found["lists"]
+    starts, counts, entries = (np.asarray(array.numpy()) for array in (lists.starts, lists.counts, lists.entries))
+    bits = np.where(counts > 0, entries[2 * np.minimum(starts, len(entries) // 2 - 1) + 1], 0)
+    return regions.unpack(t, rows)[0], (bits[:, None] >> np.arange(PARTS)) & 1 > 0
 
 
 @functools.cache
 def states(name):
-    """Per pixel: 0 outside of the box, 1 in a block that an edge excludes, 2 tested, 3 hit; and the box."""
-    t, corners = types(), TRIANGLES[name]
-    samples = lens(CAMERA).directions
-    shape = central.setup(*(t.Array3f(*map(float, corner)) for corner in corners))
-    keep = (samples.spreads >= 0) & central.may_hit(shape, samples.centres, samples.spreads)
-    blocks = SIZE // BLOCK
-    kept = np.kron(np.asarray(dr.select(keep, t.UInt(1), 0).numpy()).reshape(blocks, blocks), np.ones((BLOCK, BLOCK)))
-    box = outline(CAMERA, *corners[:, :, None])
-    low = np.clip(np.ceil(box.low[:, 0] - 0.5), 0, SIZE)
-    high = np.clip(np.floor(box.high[:, 0] + 0.5), 0, SIZE)
-    v, u = np.indices((SIZE, SIZE))
-    inside = (u >= low[0]) & (u < high[0]) & (v >= low[1]) & (v < high[1])
-    met = np.kron(inside.reshape(blocks, BLOCK, blocks, BLOCK).any((1, 3)), np.ones((BLOCK, BLOCK))) > 0
-    hits = mp.rasterize(CAMERA, mp.Mesh(corners, [[0, 1, 2]]))
-    state = np.where(met & (kept > 0), 2, np.where(inside, 1, 0))
-    if hits.stats.tests != (state == 2).sum():
-        raise RuntimeError(f"the figure shows {(state == 2).sum()} tests, the kernels make {hits.stats.tests}")
-    return np.where(hits.mask, 3, state), (low, high)
+    """Per pixel: outside of the outline, in a part that an edge drops, tested or hit; and box and lines."""
+    mesh = mp.Mesh(TRIANGLES[name], [[0, 1, 2]])
+    area, parts = listed(mesh)
+    low, high = np.array([area.x0[0], area.y0[0]]), np.array([area.x1[0], area.y1[0]])
+    lines = np.array([[number[0] for number in line] for line in area.lines])
+    v, u = np.indices((SIZE, SIZE)) + 0.5
+    inside = (u > low[0]) & (u < high[0]) & (v > low[1]) & (v < high[1])
+    inside &= (lines[:, 0, None, None] * u + lines[:, 1, None, None] * v + lines[:, 2, None, None] >= 0).all(0)
+    # Blocks row by row, in each the parts row by row.
+    tested = parts.reshape(SIZE // HEIGHT, SIZE // WIDTH, HEIGHT // PART, WIDTH // PART).swapaxes(1, 2)
+    tested = np.kron(tested.reshape(SIZE // PART, SIZE // PART), np.ones((PART, PART))) > 0
+    hits = mp.rasterize(CAMERA, mesh)
+    if (hits.stats.tests, hits.stats.rendered) != (tested.sum(), hits.mask.sum()):
+        raise RuntimeError(f"the figure shows {tested.sum()} tests, {hits.mask.sum()} hits; counted are {hits.stats}")
+    state = np.where(inside, DROPPED, OUTSIDE)
+    return np.where(hits.mask, HIT, np.where(tested, TESTED, state)), inside, (low, high), lines
+
+
+def along(line, low, high):
+    """Two points of a line a u + b v + c = 0 where it crosses a rectangle; None where it does not."""
+    a, b, c = line
+    crossings = [(u, -(a * u + c) / b) for u in (low[0], high[0]) if b]
+    crossings += [(-(b * v + c) / a, v) for v in (low[1], high[1]) if a]
+    kept = [p for p in crossings if (low - 1e-3 <= p).all() and (p <= high + 1e-3).all()]
+    return np.array([min(kept), max(kept)]) if len(kept) > 1 else None
 
 
 def draw(theme):
-    blue, orange, green, *_ = theme.palette
-    colors = [to_rgba(theme.page, 0), to_rgba(theme.weak, 0.28), to_rgba(orange, 0.75), to_rgba(blue, 0.85)]
-    figure, axes = pyplot.subplots(1, 2, figsize=(theme.width, 4.8))
+    blue, orange, green, violet, _ = theme.palette
+    colors = [to_rgba(theme.page, 0), to_rgba(theme.weak, 0.32), to_rgba(orange, 0.75), to_rgba(blue, 0.85)]
+    figure, axes = pyplot.subplots(1, 2, figsize=(theme.width, 5.0))
     for place, name in zip(axes, TRIANGLES, strict=True):
-        state, (low, high) = states(name)
+        state, inside, (low, high), lines = states(name)
         place.imshow(state, cmap=ListedColormap(colors), vmin=-0.5, vmax=3.5, interpolation="nearest")
-        for line in np.arange(-0.5, SIZE + 1, BLOCK):
-            place.axhline(line, color=theme.grid, linewidth=0.5)
-            place.axvline(line, color=theme.grid, linewidth=0.5)
+        for line in np.arange(0, SIZE + 1, HEIGHT):
+            place.axhline(line - 0.5, color=theme.grid, linewidth=0.5)
+        for line in np.arange(0, SIZE + 1, WIDTH):
+            place.axvline(line - 0.5, color=theme.grid, linewidth=0.5)
         x, y = np.array([[low[0], high[0], high[0], low[0], low[0]], [low[1], low[1], high[1], high[1], low[1]]]) - 0.5
         place.plot(x, y, color=green, linewidth=1.6)
+        drawn = [ends for line in lines if (ends := along(line, low, high)) is not None]
+        for ends in drawn:
+            place.plot(*(ends - 0.5).T, color=violet, linewidth=1.6)
         place.set_title(name)
         place.set(xlim=(-0.7, SIZE - 0.3), ylim=(SIZE - 0.3, -0.7))
         place.set_axis_off()
         place.set_anchor("N")
         entries = [
-            (Line2D([], [], color=green), f"rectangle: {int((high - low).prod()):,} pixels"),
-            (Patch(color=colors[1]), f"in blocks that an edge excludes: {int((state == 1).sum()):,}"),
-            (Patch(color=colors[2]), f"tested: {int((state >= 2).sum()):,}"),
-            (Patch(color=colors[3]), f"of these hit: {int((state == 3).sum()):,}"),
+            (Line2D([], [], color=green), f"box: {int((high - low).prod()):,} pixels"),
+            (Line2D([], [], color=violet), f"three lines, leaving {int(inside.sum()):,}"),
+            (Patch(color=colors[DROPPED]), f"in parts that an edge drops: {int((state == DROPPED).sum()):,}"),
+            (Patch(color=colors[TESTED]), f"tested: {int((state >= TESTED).sum()):,}"),
+            (Patch(color=colors[HIT]), f"of these hit: {int((state == HIT).sum()):,}"),
         ]
+        entries = entries if drawn else entries[:1] + entries[2:]
         place.legend(*zip(*entries, strict=True), loc="upper left", bbox_to_anchor=(0.0, 0.0))
     return figure

@@ -1,4 +1,4 @@
-"""What bounds a curved triangle: tangents at its corners, the sector of its cone, and the rim."""
+"""What bounds a curved triangle: tangents at its corners, along the chords too; the sector of its cone; the rim."""
 
 import numpy as np
 from matplotlib import pyplot
@@ -16,7 +16,7 @@ def direction(theta, phi):
     return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
-def outline(corners, count=400):
+def boundary(corners, count=400):
     """Image (N, 2) of the boundary of the triangle, NaN where it is out of view."""
     t = np.linspace(0, 1, count)[:, None]
     points = np.concatenate([p + (q - p) * t for p, q in zip(corners, np.roll(corners, -1, 0), strict=True)])
@@ -25,7 +25,7 @@ def outline(corners, count=400):
 
 
 def region(image):
-    """The visible part of an outline as a closed polygon (N, 2): along the rim where the triangle leaves the view."""
+    """The visible part of a boundary as a closed polygon (N, 2): along the rim where the triangle leaves the view."""
     seen = np.isfinite(image).all(1)
     if seen.all():
         return image
@@ -48,7 +48,7 @@ def tangents(corners):
 
 
 def sector(corners, count=60):
-    """Outline (N, 2) of the annular sector that holds the triangle's bounding cone."""
+    """Boundary (N, 2) of the annular sector that holds the triangle's bounding cone."""
     axis = corners.sum(0) / np.linalg.norm(corners.sum(0))
     spread = np.arccos((corners @ axis).min())
     theta, phi = np.arccos(axis[2]), np.arctan2(axis[1], axis[0])
@@ -63,9 +63,15 @@ def rectangle(axes, box, **style):
     axes.add_patch(Rectangle(box.low, *(box.high - box.low), fill=False, **style))
 
 
-def quick(corners):
-    box = outline(CAMERA, *corners[:, :, None])
-    return mp.Box(box.low[:, 0], box.high[:, 0], box.valid[0])
+def camera_outline(corners):
+    """Box of the camera's outline, and the triangle of its lines (3, 2), None where it has no lines."""
+    found = outline(CAMERA, *corners[:, :, None])
+    lines = np.array(found.lines)[:, :, 0]
+    box = mp.Box(found.low[:, 0], found.high[:, 0], found.valid[0])
+    if not lines[:, :2].any(1).all():
+        return box, None
+    pairs = zip(lines, np.roll(lines, -1, 0), strict=True)
+    return box, np.array([np.linalg.solve(np.stack(pair)[:, :2], -np.stack(pair)[:, 2]) for pair in pairs])
 
 
 def draw(theme):
@@ -78,7 +84,7 @@ def draw(theme):
     }
     for place, (title, corners) in zip(axes, triangles.items(), strict=True):
         place.add_patch(Circle((100, 100), 100, fill=False, color=theme.weak, linewidth=0.8))
-        image = outline(corners)
+        image = boundary(corners)
         place.add_patch(Polygon(region(image), color=blue, alpha=0.25, linewidth=0))
         place.plot(*image.T, color=blue, linewidth=1.6, label="image")
         rectangle(place, CAMERA.bound(corners), color=green, linewidth=1.4, label="exact box")
@@ -90,7 +96,10 @@ def draw(theme):
         axes[0].plot(*np.stack([start, end]).T, color=theme.weak, linewidth=0.8, linestyle=":", label="chords")
     axes[1].add_patch(Polygon(sector(second), fill=False, color=orange, linewidth=1, label="sector"))
     for place, corners in zip(axes, (first, second), strict=False):
-        rectangle(place, quick(corners), color=violet, linewidth=1.2, linestyle="--", label="quick box")
+        box, lines = camera_outline(corners)
+        rectangle(place, box, color=violet, linewidth=1.2, linestyle="--", label="outline")
+        if lines is not None:
+            place.add_patch(Polygon(lines, fill=False, color=violet, linewidth=1.2, linestyle="--"))
     axes[2].plot(0, 100, "o", color=orange, markersize=5, label="rim point")
     axes[0].set(xlim=(20, 92), ylim=(167, 95))
     axes[2].set_ylim(165, 35)

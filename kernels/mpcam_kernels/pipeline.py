@@ -40,7 +40,7 @@ class Pipeline:
     unpack. output: "hits", "depth" or "coverage". cull: "none", or "back" or "front" to leave out the triangles that
     turn this side to the eye. bounded: test all pixels inside of the outlines and none outside, as papers count them;
     else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and
-    hits.
+    hits. small: most pixels of a box that one lane walks.
     """
 
     def __init__(
@@ -56,11 +56,12 @@ class Pipeline:
         bounded: bool = False,
         pieces: int = 1,
         count: bool = False,
+        small: int = SMALL,
     ):
         self.types, self.outline, self.hidden = types, outline, hidden
         self.test, self.output = test, OUTPUTS[output]
         self.width, self.height = size
-        self.cull, self.bounded, self.pieces, self.count = cull, bounded, pieces, count
+        self.cull, self.bounded, self.pieces, self.count, self.small = cull, bounded, pieces, count, small
         self.columns, self.rows = blocks_of(*size)
         self._triangles = frozen(self._triangle_pass)
         self.squares = (-(-self.width // COARSE), -(-self.height // COARSE))
@@ -68,6 +69,11 @@ class Pipeline:
         self._refine = frozen(self._refine_pass)
         self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
+
+    def thaw(self) -> None:
+        """Record every frame anew, to see what freezing is worth."""
+        self._triangles, self._find, self._refine = self._triangle_pass, self._find_pass, self._refine_pass
+        self._list, self._pixels = self._list_pass, self._pixel_pass
 
     @property
     def places(self) -> int:
@@ -159,7 +165,7 @@ class Pipeline:
                 def covered(tests: Any, hits: Any, area: Any = area, seen: Any = seen) -> tuple[Any, Any]:
                     shape = test.setup(*points)
                     usable = seen & shape.usable
-                    small = usable & (area.pixels <= SMALL)
+                    small = usable & (area.pixels <= self.small)
                     more = walk.walk(
                         types, test, self.output, shape, triangle, area, small, samples, self.width, buffer, self.count
                     )

@@ -45,7 +45,7 @@ def _seen_from(pose: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def place(direction: Any, length: Any, size: int) -> tuple[Any, Any, Any]:
-    """Pixel (u, v) of device directions of a given length, and the number of the first texel of the view they are in."""
+    """Pixel (u, v) of device directions of a given length, and the number of their view's first texel."""
     import drjit as dr
 
     x, y, z = direction

@@ -19,7 +19,7 @@ def as_vectors(values: Any, name: str, unit: bool = False) -> np.ndarray:
         raise InputError(f"{name}: numbers of shape (..., 3) are needed, got {shown(values)}") from None
     if array.ndim == 0 or array.shape[-1] != 3:
         raise InputError(f"{name} has shape {array.shape}: the last axis must have length 3")
-    bad = ~np.isfinite(array).all(-1)
+    bad = ~np.asarray(np.isfinite(array).all(-1))
     if bad.any():
         raise InputError(f"{_first(array, bad, name)}: finite numbers are needed; leave out rows that mean nothing")
     if not unit:

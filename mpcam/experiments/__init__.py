@@ -48,6 +48,11 @@ EXPERIMENTS = {
             "Time and peak memory against the number of triangles and of pixels, next to ray tracing",
         ),
         Experiment(
+            "leaving-out",
+            "leaving_out",
+            "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",
+        ),
+        Experiment(
             "moving-scene",
             "moving_scene",
             "Rasterizing against rebuilding a tree and tracing, for moving and still scenes",

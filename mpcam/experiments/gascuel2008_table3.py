@@ -218,12 +218,11 @@ def _reading(rows: list[dict[str, Any]]) -> str:
         if f"{projection} quad" in first:
             quad, tight = first[f"{projection} quad"], first[f"{projection} tight"]
             parts.append(
-                f"{quad['overdraw_percent']:,.0f} % for {name} (paper: {quad['overdraw_paper_percent']:,.0f} %), and the "
+                f"{quad['overdraw_percent']:,.0f} % for {name} (paper: {quad['overdraw_paper_percent']:,.0f} %), the "
                 f"tight bound {tight['overdraw_percent']:,.0f} %"
             )
     wrong = max(row["wrong_percent"] for row in rows)
     return (
-        "Overdraw counts work and compares directly. For each pixel rendered on facade, the box of the quads tests in "
-        f"vain {'; '.join(parts)}. Overdraw depends on the scene as well as on the bound. {CARD} {STAND_IN} "
-        f"{wrong_pixels(wrong)}"
+        f"Overdraw counts work and compares directly: on facade the box of the quads has {'; '.join(parts)}. It "
+        f"depends on the scene as well as on the bound. {CARD} {STAND_IN} {wrong_pixels(wrong)}"
     )
