@@ -134,6 +134,9 @@ def render(
     shadow_size: int | None = None,
     level: int | None = None,
     resolution: int | None = None,
+    bound: str | None = None,
+    cull: str | None = None,
+    explain: bool = False,
 ) -> None:
     """Render a scene or mesh to an image file; an EXR also keeps the depth and the camera.
 
@@ -148,6 +151,9 @@ def render(
         shadow_size: Pixels along a side of those; 1024 if not given.
         level: Times that --method vertex halves each edge.
         resolution: Pixels along a face of --method cubemap and hemicube.
+        bound: tight, triangle or quad, for --method invert.
+        cull: none, back or front: the side of triangles that --method invert does not show.
+        explain: Print which stages run, which are left out, and why.
     """
     from rich.console import Console
 
@@ -164,7 +170,12 @@ def render(
     _check_machine()
     loaded = _load(scene, size).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
-    settings = {name: n for name, n in (("level", level), ("resolution", resolution)) if n is not None}
+    asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull}
+    settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    if explain:
+        from mpcam.rendering.explain import explain as explained
+
+        print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))
     with Console(stderr=True).status(f"rendering {loaded.name}"):
         texels = 1024 if shadow_size is None else shadow_size
         maps = shadow_maps(loaded, texels, shading) if shadows else ()

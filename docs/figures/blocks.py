@@ -19,9 +19,10 @@ from mpcam_kernels.samples import HEIGHT, PART, PARTS, WIDTH
 SIZE = 160
 CAMERA = mp.Radial.paraboloid(SIZE, SIZE)
 TRIANGLES = {
-    "an outline with lines": np.array([[-0.7, 0.55, 0.45], [-0.2, 1.0, 0.45], [-0.15, 0.5, 0.9]]),
+    "an outline with lines": np.array([[-0.45, 0.55, 0.7], [-0.51, 0.86, 0.02], [0.09, 0.88, 0.47]]),
     "the box of a sector": np.array([[-2.0, -1.4, 1.0], [1.3, -0.9, 0.8], [0.4, 2.6, 0.7]]),
 }
+SHOWN = {"an outline with lines": (32, 96), "the box of a sector": (0, 0)}  # from this pixel on, to the lower border
 OUTSIDE, DROPPED, TESTED, HIT = range(4)
 
 
@@ -60,7 +61,7 @@ def states(name):
 
 
 def along(line, low, high):
-    """Two points of a line a u + b v + c = 0 where it crosses a rectangle; None where it does not."""
+    """Where a line a u + b v + c = 0 enters and leaves a rectangle, (2, 2); None where it does not meet it."""
     a, b, c = line
     crossings = [(u, -(a * u + c) / b) for u in (low[0], high[0]) if b]
     crossings += [(-(b * v + c) / a, v) for v in (low[1], high[1]) if a]
@@ -75,17 +76,20 @@ def draw(theme):
     for place, name in zip(axes, TRIANGLES, strict=True):
         state, inside, (low, high), lines = states(name)
         place.imshow(state, cmap=ListedColormap(colors), vmin=-0.5, vmax=3.5, interpolation="nearest")
-        for line in np.arange(0, SIZE + 1, HEIGHT):
-            place.axhline(line - 0.5, color=theme.grid, linewidth=0.5)
-        for line in np.arange(0, SIZE + 1, WIDTH):
-            place.axvline(line - 0.5, color=theme.grid, linewidth=0.5)
+        left, top = SHOWN[name]
+        side = SIZE - top
+        grids = [(WIDTH, HEIGHT, 0.6)] + [(PART, PART, 0.25)] * (side < SIZE)
+        for across, down, width in grids:
+            place.hlines(np.arange(top, SIZE + 1, down) - 0.5, left - 0.5, left + side - 0.5, theme.weak, linewidth=width)
+            place.vlines(np.arange(left, left + side + 1, across) - 0.5, top - 0.5, SIZE - 0.5, theme.weak, linewidth=width)
         x, y = np.array([[low[0], high[0], high[0], low[0], low[0]], [low[1], low[1], high[1], high[1], low[1]]]) - 0.5
         place.plot(x, y, color=green, linewidth=1.6)
         drawn = [ends for line in lines if (ends := along(line, low, high)) is not None]
         for ends in drawn:
             place.plot(*(ends - 0.5).T, color=violet, linewidth=1.6)
         place.set_title(name)
-        place.set(xlim=(-0.7, SIZE - 0.3), ylim=(SIZE - 0.3, -0.7))
+        edge = 0.5 + 0.002 * side
+        place.set(xlim=(left - edge, left + side - 1 + edge), ylim=(SIZE - 1 + edge, top - edge))
         place.set_axis_off()
         place.set_anchor("N")
         entries = [

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
 from mpcam.effects.vectors import as_vector, as_vectors
 from mpcam.errors import InputError
@@ -49,8 +50,13 @@ class EnvironmentMap:
         shapes = [np.shape(image) for image in images]
         if len(shapes) != 2 or shapes[0] != shapes[1] or shapes[0] != (*shapes[0][:1] * 2, 3):
             raise InputError(f"images have shapes {shapes}: give two pictures of one square size, (N, N, 3) each")
+        check_size(shapes[0][0])
         self.images = images
-        self.cameras = back_to_back(self.position, check_size(shapes[0][0]))
+
+    @functools.cached_property
+    def cameras(self) -> tuple[Radial, Radial]:
+        """The cameras of the two pictures."""
+        return back_to_back(self.position, len(self.images[0]))
 
     @functools.cached_property
     @exclusive
