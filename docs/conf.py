@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import mpcam
-from mpcam_kernels import llvm, pipeline
+from mpcam_kernels import llvm, pipeline, pixels, samples
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -36,8 +36,12 @@ myst_enable_extensions = ["deflist", "dollarmath", "substitution"]
 myst_heading_anchors = 3
 # Numbers of the code that the text names; read from it, so that the two cannot differ.
 myst_substitutions = {
-    "block": str(pipeline.BLOCK),
     "small": str(pipeline.SMALL),
+    "coarse": str(samples.COARSE),
+    "block": f"{samples.WIDTH} × {samples.HEIGHT}",
+    "part": str(samples.PART),
+    "parts": str(samples.PARTS),
+    "per_lane": str(pixels.PER_LANE),
     "pairs": f"{pipeline.PAIRS:,}",
     "llvm_oldest": str(llvm.OLDEST_USABLE),
     "llvm_refused": str(llvm.OLDEST_LOADED),

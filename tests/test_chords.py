@@ -1,5 +1,6 @@
 """Bounding triangles hold the whole image of a triangle, touch its edges, and are as few as can be (every profile)."""
 
+import drjit as dr
 import drjit.llvm as types
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpcam as mp
-from mpcam.cameras.chords import Piece, chord_pieces, radial_bound_triangles
+from mpcam.cameras.chords import chord_pieces, radial_bound_triangles
+from mpcam.cameras.outline import Outline
 
 SIZE = 512
 CAMERAS = {name: camera for name, camera in cameras(SIZE).items() if isinstance(camera, mp.Radial)}
@@ -43,14 +45,14 @@ def depth(piece, u, v):
     return np.where(np.asarray(piece.valid)[:, None], np.minimum.reduce(values), -np.inf)
 
 
-def assert_holds(pieces, pixel, seen):
+def assert_holds(pieces, pixel, seen, slack=0.0):
     best = np.maximum.reduce([depth(piece, *pixel) for piece in pieces])
-    missed = (seen & (best < 0)).any(1)
+    missed = (seen & (best < -slack)).any(1)
     assert not missed.any(), (np.flatnonzero(missed), -best[seen].min())
 
 
 def count(pieces):
-    return sum(np.asarray(piece.valid).astype(int) for piece in pieces)
+    return np.sum([piece.valid for piece in pieces], axis=0)
 
 
 def families(number, seed):
@@ -94,8 +96,9 @@ def test_pieces_hold_in_float32_kernels(name):
         corners = corners[:150]
     pixel, seen = seen_points(camera, corners.astype(np.float64))
     found = camera.local_bound_triangles(*(types.Array3f(*corners[:, i].T) for i in range(3)))
+    dr.eval([[*piece.lines, piece.low, piece.high, piece.valid] for piece in found])
     pieces = [
-        Piece(tuple(line.numpy() for line in p.lines), p.low.numpy(), p.high.numpy(), p.valid.numpy()) for p in found
+        Outline(p.low.numpy(), p.high.numpy(), p.valid.numpy(), tuple(line.numpy() for line in p.lines)) for p in found
     ]
     assert_holds(pieces, pixel, seen)
 
@@ -103,7 +106,7 @@ def test_pieces_hold_in_float32_kernels(name):
 @settings(max_examples=200, deadline=None)
 @given(
     st.sampled_from(list(CAMERAS)),
-    st.lists(st.floats(-1, 1), min_size=9, max_size=9),
+    st.lists(st.floats(-1, 1, width=32), min_size=9, max_size=9),
     st.sampled_from([1.0, 1e-3, 1e-6]),
     st.integers(0, 2),
     st.floats(-6, 3),
@@ -115,7 +118,9 @@ def test_pieces_hold_adversarial_triangles(name, numbers, flatness, copies, expo
     if copies:
         corners[:, copies] = corners[:, 0]
     pixel, seen = seen_points(camera, corners)
-    assert_holds(radial_bound_triangles(camera, *split(corners)), pixel, seen)
+    # The slope of a user's function is found numerically, to ten digits or so.
+    slack = 1e-6 if name == "user, convex" else 0.0
+    assert_holds(radial_bound_triangles(camera, *split(corners)), pixel, seen, slack)
 
 
 def at(theta, phi):
@@ -244,6 +249,6 @@ def test_pieces_are_smaller_than_boxes(name):
     u, v = (np.broadcast_to(n.ravel(), (300, n.size)) for n in (u, v))
     pieces, box = radial_bound_triangles(camera, *split(corners)), camera.local_bound(*split(corners))
     nothing = np.zeros((3, 300)) + [[0], [0], [1]]
-    boxed = depth(Piece((nothing,) * 3, box.low, box.high, box.valid), u, v) >= 0
+    boxed = depth(Outline(box.low, box.high, box.valid, (nothing,) * 3), u, v) >= 0
     held = sum((depth(piece, u, v) >= 0).sum() for piece in pieces)
     assert held * 1.5 < boxed.sum()

@@ -59,9 +59,9 @@ class View:
 
     def near_edges(self) -> np.ndarray:
         """Pixels within a texel and a half, as it lies on the surface, of where light and shadow meet in the image."""
-        image = np.full(self.mask.shape, -1)
+        image: Any = np.full(self.mask.shape, -1)
         image[self.mask] = self.truth
-        edge = np.zeros(image.shape, bool)
+        edge: Any = np.zeros(image.shape, bool)
         for one, other in ((image, edge), (image.T, edge.T)):
             changes = (one[1:] != one[:-1]) & (one[1:] >= 0) & (one[:-1] >= 0)
             other[1:] |= changes

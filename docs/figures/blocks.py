@@ -11,9 +11,7 @@ from matplotlib.patches import Patch
 
 import mpcam as mp
 from mpcam.rendering.device import types
-from mpcam.rendering.outlines import hidden_by_lens, tight
-from mpcam_kernels import central, regions
-from mpcam_kernels.pipeline import Pipeline
+from mpcam_kernels import regions
 from mpcam_kernels.samples import HEIGHT, PART, PARTS, WIDTH
 
 SIZE = 160
@@ -28,11 +26,8 @@ OUTSIDE, DROPPED, TESTED, HIT = range(4)
 
 def listed(mesh):
     """What the kernels find of a mesh of one large triangle: its region, and the numbers of the parts to test."""
-    t, prepared = types(), mp.prepare(CAMERA, mesh)
-    kernels = Pipeline(t, tight, hidden_by_lens, central, (SIZE, SIZE))
-    found = {}
-    positions = prepared.place(prepared.vertices)
-    kernels.frame(prepared.lens.on_device, positions, prepared.faces, prepared.samples, found.setdefault)
+    t, prepared, found = types(), mp.prepare(CAMERA, mesh), {}
+    prepared.run(prepared.place(prepared.vertices), found.setdefault)
     rows = [dr.gather(t.Array4f, row, t.UInt(0)) for row in found["triangles"][1].regions]
     lists = found["lists"]
     starts, counts, entries = (np.asarray(array.numpy()) for array in (lists.starts, lists.counts, lists.entries))
@@ -72,7 +67,7 @@ def along(line, low, high):
 def draw(theme):
     blue, orange, green, violet, _ = theme.palette
     colors = [to_rgba(theme.page, 0), to_rgba(theme.weak, 0.32), to_rgba(orange, 0.75), to_rgba(blue, 0.85)]
-    figure, axes = pyplot.subplots(1, 2, figsize=(theme.width, 5.0))
+    figure, axes = pyplot.subplots(1, 2, figsize=(theme.width, 4.8))
     for place, name in zip(axes, TRIANGLES, strict=True):
         state, inside, (low, high), lines = states(name)
         place.imshow(state, cmap=ListedColormap(colors), vmin=-0.5, vmax=3.5, interpolation="nearest")
@@ -80,8 +75,9 @@ def draw(theme):
         side = SIZE - top
         grids = [(WIDTH, HEIGHT, 0.6)] + [(PART, PART, 0.25)] * (side < SIZE)
         for across, down, width in grids:
-            place.hlines(np.arange(top, SIZE + 1, down) - 0.5, left - 0.5, left + side - 0.5, theme.weak, linewidth=width)
-            place.vlines(np.arange(left, left + side + 1, across) - 0.5, top - 0.5, SIZE - 0.5, theme.weak, linewidth=width)
+            columns, rows = np.arange(left, left + side + 1, across) - 0.5, np.arange(top, SIZE + 1, down) - 0.5
+            place.hlines(rows, columns[0], columns[-1], theme.weak, linewidth=width)
+            place.vlines(columns, rows[0], rows[-1], theme.weak, linewidth=width)
         x, y = np.array([[low[0], high[0], high[0], low[0], low[0]], [low[1], low[1], high[1], high[1], low[1]]]) - 0.5
         place.plot(x, y, color=green, linewidth=1.6)
         drawn = [ends for line in lines if (ends := along(line, low, high)) is not None]

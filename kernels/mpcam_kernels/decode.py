@@ -17,9 +17,9 @@ def depths(types: Any, output: Any, keys: Any, scale: Any) -> Any:
     return dr.select(keys == 0, dr.inf, scale / output.nearness(types, keys))
 
 
-def in_rows(types: Any, kind: Any, values: Any, width: int, height: int) -> Any:
-    """Values kept in block order, row by row."""
-    return dr.gather(kind, values, places(types, width, height))
+def in_rows(kind: Any, values: Any, pixel: Any, width: int) -> Any:
+    """Values kept in block order, for pixels that are numbered row by row."""
+    return dr.gather(kind, values, places(pixel, width))
 
 
 def weights(types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any) -> tuple[Any, Any]:

@@ -126,7 +126,8 @@ class Pipeline:
                 lists = self._list(candidates, pairs, lists)
                 if done:
                     done("lists", lists)
-                buffer, counters = self._pixels(samples, large, lists, buffer, counters)
+                everywhere = lanes(types, 0, self.places // pixels.PER_LANE)
+                buffer, counters = self._pixels(everywhere, samples, large, lists, buffer, counters)
                 if done:
                     done("pixels", buffer)
             start += chunk
@@ -195,11 +196,11 @@ class Pipeline:
         return _Everything(self.test) if self.bounded else self.test
 
     def _pixel_pass(
-        self, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
+        self, lane: Any, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
     ) -> tuple[Any, Any]:
         size = (self.width, self.height)
         keys, *counted = pixels.through_lists(
-            self.types, self.test, self.output, samples, large, lists, buffer, size, self.bounded, self.count
+            self.types, self.test, self.output, lane, samples, large, lists, buffer, size, self.bounded, self.count
         )
         return keys, self._counted(counters, *counted)
 

@@ -18,6 +18,7 @@ def through_lists(
     types: Any,
     test: Any,
     output: Any,
+    lane: Any,
     samples: Samples,
     large: Large,
     lists: Lists,
@@ -28,9 +29,10 @@ def through_lists(
 ) -> tuple[Any, Any, Any]:
     """Keys of all pixels after their lists and what `buffer` holds; and tests and hits of each lane.
 
+    lane: the numbers of the lanes, PER_LANE pixels each; from outside, since a frozen kernel that counts them itself
+    takes its size from any array of a multiple of it, and replays the size that this array has then.
     bounded: pixels outside of a triangle's region are not tested.
     """
-    lane = dr.arange(types.UInt, dr.width(buffer) // PER_LANE)
     place = lane * PER_LANE
     block, part = place // PIXELS, (place >> 4) % PARTS
     four = types.Array4u64 if output.kind(types) is types.UInt64 else types.Array4u

@@ -59,9 +59,8 @@ def place(x: Any, y: Any, width: int) -> Any:
     return block * PIXELS + (part << 4) + ((y & 3) << 2) + (x & 3)
 
 
-def places(types: Any, width: int, height: int) -> Any:
-    """Place of every pixel, row by row."""
-    pixel = dr.arange(types.UInt, width * height)
+def places(pixel: Any, width: int) -> Any:
+    """Places of pixels that are numbered row by row."""
     return place(pixel % width, pixel // width, width)
 
 

@@ -4,15 +4,14 @@ A triangle in view gives one bounding triangle. One with a corner out of view le
 diagonal; one with two gives a triangle whose third side is an arc of the rim. Each of these is cut in two on a bisector
 if its chords are the wrong way round: four pieces at most.
 
-Other than in the paper, a line clears the control points of all curves around its piece, not those of its own edge
-only. The image of a piece lies in the convex hull of its outline, so no bound rests on a theorem about orientations:
-these decide only how tight it is. Where the outline itself is in doubt, one piece has the box of `radial_bound`.
+Other than in the paper, a line clears the control points of all sides of its piece that bend outwards, not just those
+of its own side: a piece lies in the convex hull of its outline. So it holds its part of the image whichever way its
+chords run; that decides only how tight it is. Where the outline is in doubt, one piece has the box of `radial_bound`.
 """
 
 from typing import NamedTuple
 
 from mpcam.cameras.arcs import (
-    Cone,
     RadialCamera,
     bounding_cone,
     image_and_slopes,
@@ -22,6 +21,8 @@ from mpcam.cameras.arcs import (
     visible_part,
 )
 from mpcam.cameras.hulls import Hull, area_2d, edge_hull, minus, rim_hull, unit_2d
+from mpcam.cameras.outline import Outline, without_lines
+from mpcam.cameras.types import Box
 from mpcam.math import (
     PI,
     Array,
@@ -45,19 +46,6 @@ _LONGEST = -0.9995  # cosine of 178 degrees; the plane of a longer edge is lost 
 _BEHIND = 0.05  # radians around the point behind the eye in which azimuths are lost
 
 
-class Piece(NamedTuple):
-    """A bounding triangle of a part of an image, or of all of it.
-
-    lines: three vectors (a, b, c) with a u + b v + c >= 0 for all pixels (u, v) of the part; (a, b) has length 1, but
-    for the line (0, 0, 1), which holds everywhere. low, high: a box of the part, pixels. valid: whether it exists.
-    """
-
-    lines: tuple[Vector, Vector, Vector]
-    low: Vector
-    high: Vector
-    valid: Array
-
-
 class _Curved(NamedTuple):
     """A curved triangle within the view; to be cut in two, from its first corner to `foot`, where `cut` holds.
 
@@ -70,29 +58,32 @@ class _Curved(NamedTuple):
     acute: Array
 
 
-def radial_bound_triangles(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> list[Piece]:
+def radial_bound_triangles(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> list[Outline]:
     """Four pieces, valid or not, whose union holds the image of a triangle (camera frame) within the view."""
-    box = radial_bound(camera, a, b, c)
-    zero = 0.0 * box.low[0]
-    everywhere = vector(zero, zero, zero + 1.0)
-    none = box.valid & False
-    if not camera.profile.convex:
-        return [Piece((everywhere,) * 3, box.low, box.high, box.valid if k == 0 else none) for k in range(4)]
-    pieces, sure = chord_pieces(camera, a, b, c)
-    merged = [piece._replace(valid=piece.valid & sure) for piece in pieces]
-    first = pieces[0]
-    lines = [_either(sure, line, everywhere) for line in first.lines]
-    low, high = _either(sure, first.low, box.low), _either(sure, first.high, box.high)
-    merged[0] = Piece((lines[0], lines[1], lines[2]), low, high, where(sure, first.valid, box.valid))
-    return merged
+    return pieces_or_box(*chord_pieces(camera, a, b, c), radial_bound(camera, a, b, c))
 
 
-def chord_pieces(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> tuple[list[Piece], Array]:
-    """Four pieces around a triangle, and whether they hold its image; if not, look for a rougher bound.
+def pieces_or_box(pieces: list[Outline], sure: Array, box: Box) -> list[Outline]:
+    """The pieces where they hold; elsewhere the box alone, as the first of them."""
+    first, *others = pieces
+    rough = without_lines(box)
+    lines = [_either(sure, line, nothing) for line, nothing in zip(first.lines, rough.lines, strict=True)]
+    low, high = _either(sure, first.low, rough.low), _either(sure, first.high, rough.high)
+    first = Outline(low, high, (first.valid & sure) | (rough.valid & ~sure), (lines[0], lines[1], lines[2]))
+    return [first, *(piece._replace(valid=piece.valid & sure) for piece in others)]
 
-    For profiles with `convex`. A triangle that is not finite holds in no piece.
+
+def chord_pieces(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> tuple[list[Outline], Array]:
+    """Four pieces around a triangle, and whether they hold its image; if not, take a rougher bound.
+
+    Much cheaper than `radial_bound`, which kernels better leave to the triangles that need it. Never sure of profiles
+    without `convex`. Triangles out of view, or not finite, surely have no piece.
     """
     corners, finite = unit_corners(a, b, c)
+    if not camera.profile.convex:
+        none = finite & ~finite
+        zero = 0.0 * corners[0][0]
+        return [without_lines(Box(vector(zero, zero), vector(zero, zero), none)) for _ in range(4)], none
     half = 0.5 * camera.fov + 0.0 * corners[0][2]
     rim = half + 4 * PI * epsilon(half)  # as far as the projection goes
     inside = [atan2(sqrt(p[0] * p[0] + p[1] * p[1]), p[2]) <= rim for p in corners]
@@ -115,17 +106,15 @@ def chord_pieces(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> tuple
     first, wild_inner = _halves(camera, inner, turn, all_in | one_out, False)
     last, wild_outer = _halves(camera, outer, turn, at_rim, True)
 
-    doubt = wild_inner | wild_outer | (two_out & seen_qr) | (at_rim & outer.cut & ~reached)
+    # The outlines are not as above where a view of less than 180 degrees sees parts of edges between hidden corners,
+    # and where a hidden part, in one of more, stands in the way of both diagonals or cuts an edge in two.
+    doubt = wild_inner | wild_outer | (two_out & seen_qr) | ((count == 0) & (half < 0.5 * PI))
+    doubt = doubt | (one_out & (maximum(steep_p, steep_q) < -1e-6)) | split_pq | split_qr | split_pr
+    doubt = doubt | (at_rim & outer.cut & ~reached) | _around(corners, half, all_in)
     # Where the corners and the eye lie in one plane, it is lost which way the rim is followed, and on which side of a
     # triangle around the eye its inside is.
     flat = abs(volume) <= 8 * epsilon(volume) * (norm(minus(q, p)) + norm(minus(r, p)))
-    cone = bounding_cone(corners)
-    doubt = doubt | (flat & (at_rim | cone.wide))
-    doubt = doubt | (one_out & (maximum(steep_p, steep_q) < -1e-6)) | ((count == 0) & (half < 0.5 * PI))
-    # Beyond 180 degrees, what is out of view is convex; it can cut an edge in two, or lie inside of the triangle.
-    blurred = half > PI - _BEHIND
-    doubt = doubt | split_pq | split_qr | split_pr | (blurred & ~all_in)
-    doubt = doubt | (all_in & (half > 0.5 * PI) & _behind(corners, cone, where(blurred, _BEHIND, 1e-5)))
+    doubt = doubt | (flat & (at_rim | bounding_cone(corners).wide))
     for i in range(3):
         doubt = doubt | (dot(corners[i], corners[(i + 1) % 3]) < _LONGEST) | (dot(corners[i], corners[i]) < 0.5)
     pieces = [piece._replace(valid=piece.valid & finite) for piece in (*first, *last)]
@@ -156,12 +145,18 @@ def _leaves(camera: RadialCamera, p: Vector, q: Vector) -> tuple[Vector, Array, 
     return point, split, seen
 
 
-def _behind(corners: list[Vector], cone: Cone, margin: Array) -> Array:
-    """Whether the point behind the eye lies inside of the triangle, or less than `margin` (radians) outside."""
+def _around(corners: list[Vector], half: Array, all_in: Array) -> Array:
+    """Whether the point behind the eye lies in a triangle with its corners in view, or so near that azimuths are lost.
+
+    half: half the field of view, radians. A view of up to 180 degrees has no such triangles.
+    """
+    blurred = half > PI - _BEHIND
     normals = [normalize(cross(corners[(i + 1) % 3], corners[(i + 2) % 3])) for i in range(3)]
     facing = where(dot(corners[0], normals[0]) < 0, -1.0, 1.0)
     highest = maximum(maximum(facing * normals[0][2], facing * normals[1][2]), facing * normals[2][2])
-    return (highest <= margin) & (cone.wide | (cone.theta + cone.spread >= PI - _BEHIND))
+    cone = bounding_cone(corners)
+    near = (highest <= where(blurred, _BEHIND, 1e-5)) & (cone.wide | (cone.theta + cone.spread >= PI - _BEHIND))
+    return (all_in & (half > 0.5 * PI) & near) | (blurred & ~all_in)
 
 
 def _middle(v: Vector, x: Vector, y: Vector) -> Vector:
@@ -203,7 +198,7 @@ def _azimuth(p: Vector) -> Vector:
 
 def _halves(
     camera: RadialCamera, triangle: _Curved, turn: Array, exists: Array, at_rim: bool
-) -> tuple[list[Piece], Array]:
+) -> tuple[list[Outline], Array]:
     """Both pieces of a triangle, the second one only where it is cut, and whether their outlines are in doubt.
 
     turn: the sense of its corners. at_rim: whether the side opposite to the first one follows the rim.
@@ -231,7 +226,7 @@ def _halves(
     return pieces, exists & (vx.wild | xf.wild | vf.wild | (cut & (fy.wild | vy.wild)))
 
 
-def _piece(camera: RadialCamera, corners: list[Vector], hulls: list[Hull], turn: Array, valid: Array) -> Piece:
+def _piece(camera: RadialCamera, corners: list[Vector], hulls: list[Hull], turn: Array, valid: Array) -> Outline:
     """Lines parallel to the chords, and the box, of the control points around a piece.
 
     A side that bends inwards adds nothing to the convex hull of the piece.
@@ -258,4 +253,4 @@ def _piece(camera: RadialCamera, corners: list[Vector], hulls: list[Hull], turn:
             least, most = minimum(least, point[i]), maximum(most, point[i])
         low.append(maximum(least, centre - camera.radius) - pad)
         high.append(minimum(most, centre + camera.radius) + pad)
-    return Piece((lines[0], lines[1], lines[2]), vector(*low), vector(*high), valid)
+    return Outline(vector(*low), vector(*high), valid, (lines[0], lines[1], lines[2]))

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from mpcam.cameras.arcs import radial_bound, radial_bound_rough
 from mpcam.cameras.base import Camera
-from mpcam.cameras.chords import Piece, radial_bound_triangles
+from mpcam.cameras.chords import radial_bound_triangles
 from mpcam.cameras.outline import Lens, Outline, small_outline, symmetric_lens
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
@@ -142,7 +142,7 @@ class Radial(Camera):
         """Box of the quads around the curved edges: the paper's looser bound, for comparison."""
         return radial_bound_quads(self, a, b, c)
 
-    def local_bound_triangles(self, a: Vector, b: Vector, c: Vector) -> list[Piece]:
+    def local_bound_triangles(self, a: Vector, b: Vector, c: Vector) -> list[Outline]:
         """The paper's bounding triangles: four pieces, each valid or not, whose union holds the curved triangle."""
         return radial_bound_triangles(self, a, b, c)
 

@@ -115,6 +115,13 @@ class Buffered:
         return self.run(positions, count=True)[1].numpy()
 
     @property
+    def pixels(self) -> Any:
+        """Numbers of the pixels, row by row."""
+        from mpcam_kernels.lanes import lanes
+
+        return lanes(types(), 0, self.camera.width * self.camera.height)
+
+    @property
     def triangle_count(self) -> int:
         """Triangles that the kernels see: those of the mesh, or their parts."""
         import drjit as dr
@@ -151,7 +158,7 @@ class Buffered:
 
     def _decoded(self, positions: list[Any], keys: Any) -> Any:
         unit = self.unit if self.curved else opaque_one()
-        found = _frozen_decode(self.output, self.camera.width, self.camera.height)(keys, unit)
+        found = _frozen_decode(self.output, self.camera.width)(self.pixels, keys, unit)
         if self.output == "depth":
             return DepthMap(self.camera, found[0])
         if self.output == "coverage":
@@ -159,13 +166,13 @@ class Buffered:
         return self._hits(positions, *found)
 
     def _hits(self, positions: list[Any], small: Any, depth: Any) -> Hits:
-        width, height, faces, samples = self.camera.width, self.camera.height, self.faces, self.samples.pixels
+        width, faces, samples = self.camera.width, self.faces, self.samples.pixels
         triangle = self.parent(small)
 
         def weights() -> tuple[Any, Any]:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
-            found = _frozen_weights(self.test, width, height)(small, positions[0], faces, samples)
+            found = _frozen_weights(self.test, width)(self.pixels, small, positions[0], faces, samples)
             return self.parent_weights(small, *found)
 
         def stats() -> Stats:
@@ -184,7 +191,7 @@ def opaque_one() -> Any:
 
 
 @functools.cache
-def _frozen_decode(output: str, width: int, height: int) -> Any:
+def _frozen_decode(output: str, width: int) -> Any:
     """Kernel from keys to what a frame holds, pixels row by row."""
     from mpcam_kernels import decode
     from mpcam_kernels.frozen import frozen
@@ -193,9 +200,9 @@ def _frozen_decode(output: str, width: int, height: int) -> Any:
     kind = KINDS[output]
 
     @frozen
-    def decoded(keys: Any, unit: Any) -> tuple[Any, ...]:
+    def decoded(pixel: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
         t = types()
-        found = decode.in_rows(t, kind.kind(t), keys, width, height)
+        found = decode.in_rows(kind.kind(t), keys, pixel, width)
         if output == "coverage":
             return (found != 0,)
         depth = decode.depths(t, kind, found, unit)
@@ -205,13 +212,13 @@ def _frozen_decode(output: str, width: int, height: int) -> Any:
 
 
 @functools.cache
-def _frozen_weights(test: str, width: int, height: int) -> Any:
+def _frozen_weights(test: str, width: int) -> Any:
     from mpcam_kernels import decode
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def weights(triangle: Any, positions: Any, faces: Any, samples: Any) -> tuple[Any, Any]:
-        views = decode.in_rows(types(), type(samples), samples, width, height)
+    def weights(pixel: Any, triangle: Any, positions: Any, faces: Any, samples: Any) -> tuple[Any, Any]:
+        views = decode.in_rows(type(samples), samples, pixel, width)
         return decode.weights(types(), kernel_test(test), positions, faces, triangle, views)
 
     return weights
