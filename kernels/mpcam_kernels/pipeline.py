@@ -24,7 +24,10 @@ from mpcam_kernels.samples import COARSE, PIXELS, Samples
 from mpcam_kernels.samples import blocks as blocks_of
 
 SMALL = 96  # pixels in a region that one lane walks by itself
-PAIRS = 1 << 18  # item-block pairs held at a time; the rest comes in chunks
+PAIRS = (
+    1 << 18
+)  # item-block pairs held at a time, or PER_BLOCK for each block if these are more; the rest comes in chunks
+PER_BLOCK = 4
 LANES = 1 << 22  # of those that look for pairs, at a time
 
 
@@ -63,6 +66,7 @@ class Pipeline:
         self.width, self.height = size
         self.cull, self.bounded, self.pieces, self.count, self.small = cull, bounded, pieces, count, small
         self.columns, self.rows = blocks_of(*size)
+        self.pairs = max(PAIRS, PER_BLOCK * self.columns * self.rows)
         self._triangles = frozen(self._triangle_pass)
         self.squares = (-(-self.width // COARSE), -(-self.height // COARSE))
         self._find = frozen(self._find_pass)
@@ -109,15 +113,15 @@ class Pipeline:
         if done:
             done("triangles", (buffer, large))
         items = large.count[0]
-        per_item = blocks.share(items, *self.squares, PAIRS // blocks.BLOCKS)
+        per_item = blocks.share(items, *self.squares, self.pairs // blocks.BLOCKS)
         total = items * per_item
         start, chunk = 0, min(total, LANES)
         while start < total:
             chunk = min(chunk, total - start)
             squares = self._find(lanes(types, start, start + chunk), per_item, samples, large)
             needed = squares.found[0] * blocks.BLOCKS
-            if needed > PAIRS and chunk > 1:
-                chunk = max(1, chunk // (1 + needed // PAIRS))
+            if needed > self.pairs and chunk > 1:
+                chunk = max(1, chunk // (1 + needed // self.pairs))
                 continue
             if needed:
                 candidates = lanes(types, 0, needed)
@@ -181,12 +185,14 @@ class Pipeline:
         return buffer, large, self._counted(counters, *counted)
 
     def _find_pass(self, lanes: Any, per_item: int, samples: Samples, large: blocks.Large) -> blocks.Squares:
-        most = PAIRS // blocks.BLOCKS
+        most = self.pairs // blocks.BLOCKS
         return blocks.find_squares(self.types, self._picker, lanes, per_item, samples, large, self.squares[0], most)
 
     def _refine_pass(self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares) -> blocks.Pairs:
         grid = (self.columns, self.rows)
-        return blocks.find_pairs(self.types, self._picker, lanes, samples, large, grid, squares, PAIRS, self.bounded)
+        return blocks.find_pairs(
+            self.types, self._picker, lanes, samples, large, grid, squares, self.pairs, self.bounded
+        )
 
     def _list_pass(self, lanes: Any, pairs: blocks.Pairs, lists: blocks.Lists) -> blocks.Lists:
         return blocks.list_pairs(self.types, lanes, pairs, lists)
