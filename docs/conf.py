@@ -43,6 +43,7 @@ myst_substitutions = {
     "parts": str(samples.PARTS),
     "per_lane": str(pixels.PER_LANE),
     "pairs": f"{pipeline.PAIRS:,}",
+    "per_block": str(pipeline.PER_BLOCK),
     "llvm_oldest": str(llvm.OLDEST_USABLE),
     "llvm_refused": str(llvm.OLDEST_LOADED),
 }

@@ -4,7 +4,7 @@ import drjit.llvm as types
 import numpy as np
 import pytest
 from catalogue import NAMES, cameras, triangles
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import mpcam as mp
@@ -96,6 +96,7 @@ def test_lines_of_outlines_hold_every_sampled_point(name, precision, size):
 
 
 @settings(max_examples=100, deadline=None)
+@example("paraboloid", [0.0, 1.0, -3.4e-283, 1.0, 0.0, 0.0, 1.0, 0.0, -0.0078125], 0.0, 0)  # an edge along the rim
 @given(
     st.sampled_from(NAMES),
     st.lists(st.floats(-1, 1), min_size=9, max_size=9),

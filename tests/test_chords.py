@@ -15,6 +15,7 @@ from mpcam.cameras.outline import Outline
 SIZE = 512
 CAMERAS = {name: camera for name, camera in cameras(SIZE).items() if isinstance(camera, mp.Radial)}
 CAMERAS["equisolid 270"] = mp.Radial.equisolid(SIZE, SIZE, fov=1.5 * np.pi)
+CAMERAS["user 270"] = mp.Radial.from_function(SIZE, SIZE, lambda theta: theta, fov=1.5 * np.pi)
 CAMERAS["paraboloid 320"] = mp.Radial.paraboloid(SIZE, SIZE, fov=np.radians(320))
 PROFILES = ["paraboloid", "cosine_sphere", "equisolid", "equidistant"]
 
@@ -66,12 +67,15 @@ def families(number, seed):
     needles[:, 2] = plain[:, 0] * (1 - along) + plain[:, 1] * along + thin
     horizon = plain.copy()
     horizon[..., 2] *= flat
+    opposite = plain.copy()
+    opposite[:, 1] = -2 * plain[:, 0] + 10.0 ** rng.uniform(-7, -1, (number, 1)) * rng.normal(size=(number, 3))
     wide = 10.0 ** rng.uniform(-3, 1, (number, 1, 1)) * rng.normal(size=(number, 3, 3)) * [1, 1, 0.3]
     return {
         "everywhere": plain,
         "near the horizon": horizon,
         "needles": needles,
         "needles near the horizon": needles * np.stack([np.ones_like(flat), np.ones_like(flat), flat], -1),
+        "nearly through the eye": opposite,
         "around the eye": rng.normal(size=(number, 3, 3)),
         "around the axis": wide + [0, 0, 1.0],
         "behind the eye": plain * [1, 1, 0.3] - [0, 0, 1.0],
@@ -204,6 +208,17 @@ def test_corners_out_of_view(name, clipped):
         assert count(pieces) == 3 - clipped
         pixel, seen = seen_points(camera, corners)
         assert_holds(pieces, pixel, seen)
+
+
+@pytest.mark.parametrize("name", [*PROFILES, "paraboloid 270", "equidistant 270"])
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_triangles_around_an_eye_in_their_plane(name, tilt):
+    """They have no inside to tell, and are seen all around."""
+    corners = np.array([[[0.0, 1, 0], [-1, 1, 0], [0.25, -0.5, 0]]])
+    corners[..., 2] = tilt * corners[..., 0]
+    for order in ([0, 1, 2], [2, 1, 0]):
+        pixel, seen = seen_points(CAMERAS[name], corners[:, order])
+        assert_holds(radial_bound_triangles(CAMERAS[name], *split(corners[:, order])), pixel, seen)
 
 
 def test_a_view_below_180_degrees_may_see_what_no_corner_tells():

@@ -1,7 +1,12 @@
-"""Recording a kernel survives what the garbage collector does meanwhile."""
+"""Recorded kernels: the garbage collector does not disturb a recording, and a replay has the size of its input."""
 
 import subprocess
 import sys
+
+import numpy as np
+import pytest
+
+import mpcam as mp
 
 SCRIPT = """
 import gc
@@ -39,3 +44,20 @@ def test_a_recording_is_not_disturbed_by_the_collector():
 def test_without_care_it_would_be():
     """Once this fails, Dr.Jit has mended it, and `frozen` need not stop the collector any more."""
     assert _run("dr.freeze").returncode != 0
+
+
+@pytest.mark.parametrize("output", ["hits", "depth", "coverage"])
+def test_frames_of_another_mesh_have_their_own_size(output):
+    """A frozen kernel that counts its lanes itself takes their number from any array that is a multiple of it."""
+    camera = mp.Radial.paraboloid(100, 100)  # 112 x 104 places with the blocks at the border: 1,456 lanes of eight
+    for triangles in (4004, 1456, 1457, 364, 2912, 100, 101):
+        corners = np.random.default_rng(triangles).normal(size=(triangles, 1, 3))
+        corners = corners + 0.2 * np.random.default_rng(1).normal(size=(triangles, 3, 3))
+        mesh = mp.Mesh(corners.reshape(-1, 3), np.arange(3 * triangles).reshape(-1, 3))
+        frame = mp.prepare(camera, mesh, output=output).frame()
+        truth = mp.rasterize(camera, mesh, method="raytrace")
+        assert (frame.mask != truth.mask).mean() <= 2e-4
+        if output == "hits":
+            same = frame.mask & (frame.triangle == truth.triangle)
+            assert (frame.triangle != truth.triangle).mean() <= 5e-4
+            assert np.abs(frame.barycentric - truth.barycentric)[same].max() < 2e-2

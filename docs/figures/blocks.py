@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 import mpcam as mp
 from mpcam.rendering.device import types
+from mpcam.rendering.invert import Inverted
 from mpcam_kernels import regions
 from mpcam_kernels.samples import HEIGHT, PART, PARTS, WIDTH
 
@@ -26,7 +27,7 @@ OUTSIDE, DROPPED, TESTED, HIT = range(4)
 
 def listed(mesh):
     """What the kernels find of a mesh of one large triangle: its region, and the numbers of the parts to test."""
-    t, prepared, found = types(), mp.prepare(CAMERA, mesh), {}
+    t, prepared, found = types(), Inverted(CAMERA, mesh), {}
     prepared.run(prepared.place(prepared.vertices), found.setdefault)
     rows = [dr.gather(t.Array4f, row, t.UInt(0)) for row in found["triangles"][1].regions]
     lists = found["lists"]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.outline import outline
 from mpcam.cameras.radial import Radial
 from mpcam.errors import InputError
 from mpcam.stress.report import Case
@@ -143,45 +144,73 @@ def _exact(camera: Radial, point: np.ndarray) -> tuple[np.ndarray, float, float]
 
 
 def bound_cases(name: str, camera: Radial, count: int, seed: int = 3, chunk: int = 250_000) -> list[Case]:
-    """All boxes of random triangles, as the kernels compute them (float32), against samples in float64."""
-    methods = {"tight box": "local_bound", "quick box": "local_bound_quick", "box of quads": "local_bound_quads"}
-    missed = dict.fromkeys(methods, 0)
+    """All bounds of random triangles, as the kernels compute them (float32), against samples in float64."""
+    missed = dict.fromkeys(BOUNDS, 0)
     rng, done = np.random.default_rng(seed), 0
     while done < count:
         now = min(chunk, count - done)
         centre = rng.normal(size=(now, 1, 3))
         corners = centre + 10 ** rng.uniform(-3, 0.8, (now, 1, 1)) * rng.normal(size=(now, 3, 3))
         corners = corners.astype(np.float32)
-        for kind, wrong in _missed(camera, corners, methods).items():
+        for kind, wrong in _missed(camera, corners).items():
             missed[kind] += wrong
         done += now
-    return [Case(name, kind, "float32", count, float("nan"), missed[kind], 0) for kind in methods]
+    return [Case(name, kind, "float32", count, float("nan"), missed[kind], 0) for kind in BOUNDS]
 
 
-def _missed(camera: Radial, corners: np.ndarray, methods: dict[str, str]) -> dict[str, int]:
-    """How many triangles have a sampled point outside of each box: along the edges, and inside."""
+def _missed(camera: Radial, corners: np.ndarray) -> dict[str, int]:
+    """How many triangles have a sampled point, along the edges or inside, that a bound leaves out."""
     import drjit as dr
 
     from mpcam.rendering.device import types
 
     t = types()
     exact = [t.Array3f64(*corners[:, i].T.astype(np.float64)) for i in range(3)]
-    low, high = t.Array2f64(np.inf), t.Array2f64(-np.inf)
+    single = [t.Array3f(*corners[:, i].T) for i in range(3)]
+    regions = {kind: [_Region(t, region) for region in bound(camera, *single)] for kind, bound in BOUNDS.items()}
+    out = {kind: t.Bool(False) for kind in regions}
+    dr.eval([region.arrays for several in regions.values() for region in several])
     for weights in _weights():
         point = exact[0] * weights[0] + exact[1] * weights[1] + exact[2] * weights[2]
         image = camera.local_project(point)[0]
-        low = dr.select(image.valid, dr.minimum(low, image.pixel), low)
-        high = dr.select(image.valid, dr.maximum(high, image.pixel), high)
-        dr.eval(low, high)
-    slack = 2e-6 * SIZE + 1e-3  # by which the kernels widen every box
-    result = {}
-    for kind, method in methods.items():
-        box = getattr(camera, method)(*(t.Array3f(*corners[:, i].T) for i in range(3)))
-        under, over = t.Array2f64(box.low) - slack, t.Array2f64(box.high) + slack
-        outside = (low.x < under.x) | (low.y < under.y) | (high.x > over.x) | (high.y > over.y)
-        wrong: Any = dr.count((low.x <= high.x) & (outside | ~box.valid))
-        result[kind] = int(wrong[0])
-    return result
+        for kind, several in regions.items():
+            held = t.Bool(False)
+            for region in several:
+                held |= region.holds(image.pixel)
+            out[kind] = out[kind] | (image.valid & ~held)
+        dr.eval(out)
+    counts = {kind: dr.count(wrong) for kind, wrong in out.items()}
+    return {kind: int(many[0]) for kind, many in counts.items()}  # pyright: ignore[reportIndexIssue]
+
+
+class _Region:
+    """A box with three lines, widened as the kernels widen it, in float64."""
+
+    def __init__(self, types: Any, region: Any):
+        self.low, self.high = types.Array2f64(region[0]), types.Array2f64(region[1])
+        self.valid, self.lines = region[2], [types.Array3f64(*line) for line in region[3]]
+        self.arrays = (self.low, self.high, self.valid, self.lines)
+
+    def holds(self, pixel: Any) -> Any:
+        slack = 2e-6 * SIZE + 1e-3
+        inside = self.valid & (pixel.x >= self.low.x - slack) & (pixel.y >= self.low.y - slack)
+        inside &= (pixel.x <= self.high.x + slack) & (pixel.y <= self.high.y + slack)
+        for a, b, c in self.lines:
+            inside &= a * pixel.x + b * pixel.y + c >= -slack
+        return inside
+
+
+def _pieces(camera: Radial, a: Any, b: Any, c: Any) -> list[Any]:
+    return [(piece.low, piece.high, piece.valid, piece.lines) for piece in camera.local_bound_triangles(a, b, c)]
+
+
+BOUNDS: dict[str, Callable[..., list[Any]]] = {
+    "box": lambda camera, a, b, c: [(*camera.local_bound(a, b, c), ())],
+    "outline": lambda camera, a, b, c: [outline(camera, a, b, c)],
+    "bounding triangles": _pieces,
+    "box of quads": lambda camera, a, b, c: [(*camera.local_bound_quads(a, b, c), ())],
+}
+"""Regions of which one holds each point of a triangle's image: low, high, valid, lines."""
 
 
 def _weights() -> list[tuple[float, float, float]]:
