@@ -15,8 +15,8 @@ from test_bounds import assert_holds, extent
 from test_rasterize import assert_agree
 
 import mpcam as mp
-from mpcam.cameras.outline import outline
 from mpcam.cameras.change import resized
+from mpcam.cameras.outline import outline
 from mpcam.rendering.device import device_lens
 
 TUM_VI = (0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182)

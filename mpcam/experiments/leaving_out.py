@@ -36,16 +36,16 @@ EXPECTED: dict[str, tuple[float, float, float]] = {
 """Time without / time with, on the three scenes."""
 
 WHY = {
-    "walk of small triangles": "a lane finishes its triangle where it is set up; lists cost more than a few pixels do",
-    "lists of blocks": "a lane that walks a street's ground alone keeps all others waiting",
-    "lines of the outlines": "half of a triangle's box lies outside of it",
-    "edge tests of blocks and parts": "where no lines are known, and where edges bend",
-    "projection kept per vertex": "six triangles share a vertex: its angle and its radius are needed once",
-    "hidden triangles dropped first": "a view of 180 degrees has half of all triangles behind it",
-    "frozen kernels": "recording a frame anew takes Python longer than the frame takes",
+    "walk of small triangles": "a few pixels cost less than a list",
+    "lists of blocks": "one lane would walk a street's ground",
+    "lines of the outlines": "half of a box is outside the triangle",
+    "edge tests of blocks and parts": "edges bend, and some have no lines",
+    "projection kept per vertex": "six triangles share a vertex",
+    "hidden triangles dropped first": "half of a room lies behind a view",
+    "frozen kernels": "recording takes Python's time",
     "triangle numbers (depth alone)": "32 bits a pixel instead of 64",
-    "depths too (coverage alone)": "no plane, no comparison, no atomics, and a full block is done",
-    "back faces (cull='back')": "half of the triangles of a closed surface; holes where surfaces are open",
+    "depths too (coverage alone)": "no atomics; full blocks end early",
+    "back faces (cull='back')": "half of a closed surface",
 }
 
 
