@@ -2,6 +2,8 @@
 
 import drjit as dr
 import drjit.llvm as types
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import cameras, triangles
@@ -103,6 +105,17 @@ def test_pieces_hold_in_float32_kernels(name):
         Outline(p.low.numpy(), p.high.numpy(), p.valid.numpy(), tuple(line.numpy() for line in p.lines)) for p in found
     ]
     assert_holds(pieces, pixel, seen)
+
+
+@pytest.mark.parametrize("name", ["cosine_sphere", "equidistant 270"])
+def test_jax_finds_the_same_pieces(name):
+    corners = split(families(50, 13)["everywhere"])
+    with jax.enable_x64(True):
+        found = radial_bound_triangles(CAMERAS[name], *(jnp.asarray(corner) for corner in corners))
+    for piece, same in zip(found, radial_bound_triangles(CAMERAS[name], *corners), strict=True):
+        assert np.array_equal(piece.valid, same.valid)
+        for line, line_of_numpy in zip(piece.lines, same.lines, strict=True):
+            assert np.allclose(np.asarray(line)[:, same.valid], line_of_numpy[:, same.valid], atol=1e-6)
 
 
 @settings(max_examples=200, deadline=None)

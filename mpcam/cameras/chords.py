@@ -94,9 +94,7 @@ def chord_pieces(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> tuple
     volume = dot(p, cross(minus(q, p), minus(r, p)))
     turn = where(volume < 0, -1.0, 1.0)
 
-    pq, split_pq, _ = _leaves(camera, p, q)
-    qr, split_qr, seen_qr = _leaves(camera, q, r)
-    pr, split_pr, _ = _leaves(camera, p, r)
+    (pq, split_pq), (qr, split_qr), (pr, split_pr) = (_leaves(camera, *edge) for edge in ((p, q), (q, r), (p, r)))
     # The diagonal that meets the rim more steeply stays in view wherever one of them does.
     steep_p, steep_q = p[2] - dot(p, qr) * cos(half), q[2] - dot(q, pr) * cos(half)
     other = one_out & (steep_q > steep_p)
@@ -106,9 +104,9 @@ def chord_pieces(camera: RadialCamera, a: Vector, b: Vector, c: Vector) -> tuple
     first, wild_inner = _halves(camera, inner, turn, all_in | one_out, False)
     last, wild_outer = _halves(camera, outer, turn, at_rim, True)
 
-    # The outlines are not as above where a view of less than 180 degrees sees parts of edges between hidden corners,
-    # and where a hidden part, in one of more, stands in the way of both diagonals or cuts an edge in two.
-    doubt = wild_inner | wild_outer | (two_out & seen_qr) | ((count == 0) & (half < 0.5 * PI))
+    # A view below 180 degrees may see a triangle, but none of its corners. In a wider one, what is hidden can stand in
+    # the way of both diagonals, or cut an edge in two.
+    doubt = wild_inner | wild_outer | ((count == 0) & (half < 0.5 * PI))
     doubt = doubt | (one_out & (maximum(steep_p, steep_q) < -1e-6)) | split_pq | split_qr | split_pr
     doubt = doubt | (at_rim & outer.cut & ~reached) | _around(corners, half, all_in)
     # Where the corners and the eye lie in one plane, it is lost which way the rim is followed, and on which side of a
@@ -130,19 +128,19 @@ def _turned(corners: list[Vector], second: Array, third: Array) -> list[Vector]:
     return [_either(second, corners[(i + 1) % 3], _either(third, corners[(i + 2) % 3], corners[i])) for i in range(3)]
 
 
-def _along(camera: RadialCamera, p: Vector, toward: Vector, length: Array) -> tuple[Vector, Array, Array, Array]:
-    """Where the arc from p towards another direction leaves the view, how far along, if in two parts, if at all."""
+def _along(camera: RadialCamera, p: Vector, toward: Vector, length: Array) -> tuple[Vector, Array, Array]:
+    """Where the arc from p towards another direction leaves the view, how far along, and if it is seen in two parts."""
     along = dot(p, toward)
     tangent = normalize(vector(*(toward[i] - p[i] * along for i in range(3))))
-    start, span, seen, split = visible_part(camera, p, tangent, length)
+    start, span, _, split = visible_part(camera, p, tangent, length)
     end = start + span
-    return vector(*(p[i] * cos(end) + tangent[i] * sin(end) for i in range(3))), end, split, seen
+    return vector(*(p[i] * cos(end) + tangent[i] * sin(end) for i in range(3))), end, split
 
 
-def _leaves(camera: RadialCamera, p: Vector, q: Vector) -> tuple[Vector, Array, Array]:
-    """Where the edge from p to q leaves the view, whether it is seen in two parts, whether at all."""
-    point, _, split, seen = _along(camera, p, q, atan2(norm(cross(p, q)), dot(p, q)))
-    return point, split, seen
+def _leaves(camera: RadialCamera, p: Vector, q: Vector) -> tuple[Vector, Array]:
+    """Where the edge from p to q leaves the view, and whether it is seen in two parts."""
+    point, _, split = _along(camera, p, q, atan2(norm(cross(p, q)), dot(p, q)))
+    return point, split
 
 
 def _around(corners: list[Vector], half: Array, all_in: Array) -> Array:
@@ -188,7 +186,7 @@ def _outer(camera: RadialCamera, corners: list[Vector], turn: Array) -> tuple[_C
     acute = dot(x, y) > dot(v, x) * dot(v, y)
     _, angle = rim_hull(camera, _azimuth(x), _azimuth(y), turn, acute)
     cut = (angle > PI) | _inverted(camera, [image_and_slopes(camera, p)[0] for p in corners], turn)
-    foot, length, _, _ = _along(camera, v, _middle(v, x, y), PI + 0.0 * angle)
+    foot, length, _ = _along(camera, v, _middle(v, x, y), PI + 0.0 * angle)
     return _Curved(corners, _either(cut, foot, y), cut, acute | cut), length < 0.999 * PI
 
 

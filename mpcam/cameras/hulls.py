@@ -12,9 +12,9 @@ from mpcam.cameras.arcs import RadialCamera, image_and_slopes, rounding
 from mpcam.cameras.profiles import COSINE_SPHERE, PARABOLOID, Profile
 from mpcam.math import PI, Array, Vector, atan2, cos, dot, epsilon, maximum, minimum, sin, sqrt, vector, where
 
-_STEPS = 3  # after two steps of false position, tangents are parallel to about 1e-4
+_STEPS = 3  # a guess and two of false position, after which tangents are parallel to about 1e-4
 
-_TOGETHER = 4e-3  # radians; rounding moves the end of an edge that is nearly parallel to the rim by up to half of it
+_TOGETHER = 6e-3  # radians; rounding moves the end of an edge that is nearly parallel to the rim by up to 2.5e-3
 
 
 class Hull(NamedTuple):

@@ -1,7 +1,9 @@
 """The bounds that can be asked for, as the kernels want them: outlines of triangles from the rows of their corners."""
 
+from collections.abc import Callable
 from typing import Any
 
+from mpcam.cameras.chords import chord_pieces
 from mpcam.cameras.outline import HIDDEN, Lens, without_lines
 from mpcam_kernels.regions import Outline
 
@@ -14,21 +16,10 @@ PIECES = {"triangle": 4}
 
 def tight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     """By the tangents at the corners; the camera's rough box where these are not enough."""
-    import drjit as dr
-
     points = [row[0].xyz for row in rows]
     lenses = [Lens(row[1].x, row[1].y, row[1].z, row[0].w) for row in rows]
     quick, sure = camera.local_outline(points, lenses)
-    kind = type(points[0].x)
-
-    def rough(a: Any, b: Any, c: Any, *_: Any) -> tuple[Any, ...]:
-        return _flat(kind, without_lines(camera.local_bound_rough(a, b, c)))
-
-    def keep(a: Any, b: Any, c: Any, *rest: Any) -> tuple[Any, ...]:
-        return rest
-
-    found = dr.if_stmt((*points, *_flat(kind, quick)), ~sure, rough, keep)
-    return [_nested(found)]
+    return [_or_box(points, quick, sure, camera.local_bound_rough)]
 
 
 def quad(camera: Any, rows: list[list[Any]]) -> list[Outline]:
@@ -37,9 +28,11 @@ def quad(camera: Any, rows: list[list[Any]]) -> list[Outline]:
 
 
 def triangle(camera: Any, rows: list[list[Any]]) -> list[Outline]:
-    """Up to four bounding triangles."""
-    pieces = camera.local_bound_triangles(*(row[0].xyz for row in rows))
-    return [Outline(piece.low, piece.high, piece.valid, piece.lines) for piece in pieces]
+    """Up to four bounding triangles; the camera's own box where these are not sure."""
+    points = [row[0].xyz for row in rows]
+    (first, *others), sure = chord_pieces(camera, *points)
+    rest = [Outline(piece.low, piece.high, piece.valid & sure, piece.lines) for piece in others]
+    return [_or_box(points, first, sure, camera.local_bound), *rest]
 
 
 def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
@@ -77,6 +70,21 @@ def hidden_never(first: list[Any]) -> Any:
 
 HIDDEN_TESTS = {"tight": hidden_by_lens}
 OUTLINES = {"tight": tight, "quad": quad, "triangle": triangle, "straight": straight}
+
+
+def _or_box(points: list[Any], outline: Any, sure: Any, bound: Callable[..., Any]) -> Outline:
+    """The outline, or where it is not sure a box, which is worked out only there."""
+    import drjit as dr
+
+    kind = type(points[0].x)
+
+    def box(a: Any, b: Any, c: Any, *_: Any) -> tuple[Any, ...]:
+        return _flat(kind, without_lines(bound(a, b, c)))
+
+    def keep(a: Any, b: Any, c: Any, *rest: Any) -> tuple[Any, ...]:
+        return rest
+
+    return _nested(dr.if_stmt((*points, *_flat(kind, outline)), ~sure, box, keep))
 
 
 def _flat(kind: Any, outline: Any) -> tuple[Any, ...]:
