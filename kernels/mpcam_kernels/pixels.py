@@ -49,14 +49,15 @@ def through_lists(
         if not bounded:
             return [mask] * PER_LANE
         area, _ = regions.unpack(types, [dr.gather(types.Array4f, row, number) for row in large.regions])
-        inside = []
-        for k in range(PER_LANE):
-            column, row = types.Int(x + k % 4), types.Int(y + k // 4)
-            first, last = area.spans(types)(row, row)
-            inside.append((row >= area.y0) & (row < area.y1) & (column >= first) & (column < last))
+        spans, inside = area.spans(types), []
+        for line in range(FOURS):
+            row = types.Int(y + line)
+            first, last = spans(row, row)
+            within = (row >= area.y0) & (row < area.y1)
+            inside += [within & (types.Int(x + k) >= first) & (types.Int(x + k) < last) for k in range(4)]
         return inside
 
-    def tested(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
+    def body(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
         name, bits = dr.gather(types.Array2u, lists.entries, index)
         mask, triangle = ((bits >> part) & 1) != 0, name
         if bounded:
@@ -78,11 +79,7 @@ def through_lists(
                 nearest.append(best[k] | covered)
             if count:
                 tests, hits = tests + dr.select(possible, types.UInt(1), 0), hits + dr.select(covered, 1, 0)
-        return nearest, first, tests, hits, index
-
-    def body(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        *state, index = tested(best, owners, tests, hits, index)
-        return *state, index + 1
+        return nearest, first, tests, hits, index + 1
 
     def unfinished(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
         return (index < end) if output.depth else (index < end) & ~functools.reduce(operator.and_, best)

@@ -39,9 +39,11 @@ def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     """Straight-edged image triangles; without an image where a corner is not finite."""
     import drjit as dr
 
+    from mpcam_kernels import planar
+
     a, b, c = (row[0].xyz for row in rows)
     low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
-    area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+    area = planar.turn(a, b, c)
     lines = []
     for p, q in ((a, b), (b, c), (c, a)):
         step = q.xy - p.xy
@@ -94,10 +96,10 @@ def _flat(kind: Any, outline: Any) -> tuple[Any, ...]:
 
 
 def _nested(values: Any) -> Outline:
-    *_, valid = values
-    numbers = values[-14:-1]
-    lines = tuple(numbers[4 + 3 * k : 7 + 3 * k] for k in range(3))
-    return Outline(numbers[0:2], numbers[2:4], valid, lines)
+    """The outline at the end of what a branch returned."""
+    *numbers, valid = values[-14:]
+    first, second, third = (numbers[k : k + 3] for k in (4, 7, 10))
+    return Outline(numbers[0:2], numbers[2:4], valid, (first, second, third))
 
 
 def _kernel_outline(outline: Any) -> Outline:
