@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from mpcam.cameras import Box as Box
     from mpcam.cameras import Camera as Camera
     from mpcam.cameras import Domain as Domain
+    from mpcam.cameras import CameraTriangles as CameraTriangles
     from mpcam.cameras import DoubleSphere as DoubleSphere
     from mpcam.cameras import KannalaBrandt as KannalaBrandt
     from mpcam.cameras import Orthographic as Orthographic
@@ -63,7 +64,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
-        "Box Camera Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray UnifiedOmni "
+        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray UnifiedOmni "
         "custom_profile look_at"
     ),
     "mpcam.comparison.driver": "compare",

@@ -22,13 +22,15 @@ def in_rows(kind: Any, values: Any, pixel: Any, width: int) -> Any:
     return dr.gather(kind, values, places(pixel, width))
 
 
-def weights(types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any) -> tuple[Any, Any]:
+def weights(
+    types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any, row: Any
+) -> tuple[Any, Any]:
     """Barycentric weights of corners 2 and 3 where `samples` hit their triangles; 0 where triangle is -1.
 
-    vertices: four numbers each, of which three are the position.
+    vertices: a row (an array type) each, which starts with the position.
     """
     hit = triangle >= 0
     corners = dr.gather(types.Array3u, faces, types.UInt(dr.maximum(triangle, 0)), hit)
-    shape = test.setup(*(dr.gather(types.Array4f, vertices, corner, hit).xyz for corner in corners))
+    shape = test.setup(*(dr.gather(row, vertices, corner, hit).xyz for corner in corners))
     second, third = test.weights(shape, samples)
     return dr.select(hit, dr.clip(second, 0, 1), 0), dr.select(hit, dr.clip(third, 0, 1), 0)

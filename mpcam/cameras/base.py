@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from mpcam.cameras.pose import as_pose
+from mpcam.cameras.pose import as_pose, frame_origin
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
@@ -21,7 +21,7 @@ def _quiet() -> np.errstate:
     return np.errstate(invalid="ignore", over="ignore")
 
 
-def _components(values: Array, count: int, name: str) -> Vector:
+def components(values: Array, count: int, name: str) -> Vector:
     """(..., count) NumPy or JAX array to components first; Dr.Jit vectors are so already."""
     kind = library(values)
     if kind == "drjit":
@@ -68,6 +68,8 @@ class Camera:
 
     central: ClassVar[bool] = True
     """Whether all rays leave from the origin of the camera frame."""
+    parallel: ClassVar[bool] = False
+    """Whether all rays run along +z of the camera frame."""
     images_per_point: ClassVar[int] = 1
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height")
     """Fields that are part of the program rather than of the data (JAX, frozen kernels)."""
@@ -93,7 +95,7 @@ class Camera:
         """
         register_pytrees()
         with _quiet():
-            origin, direction, valid = self.local_ray(_components(pixel, 2, "pixel"))
+            origin, direction, valid = self.local_ray(components(pixel, 2, "pixel"))
         pose, shift = self.camera_from_world, translation(self.camera_from_world)
         moved = vector(origin[0] - shift[0], origin[1] - shift[1], origin[2] - shift[2])
         return Ray(_last(rotate_back(pose, moved)), _last(rotate_back(pose, direction)), valid)
@@ -106,7 +108,7 @@ class Camera:
         """
         register_pytrees()
         with _quiet():
-            images = self.local_project(self.local(_components(points, 3, "points")))
+            images = self.local_project(self.local(components(points, 3, "points")))
         kind = library(*images[0])
         if kind == "drjit":
             return Projection(*(tuple(image[i] for image in images) for i in range(3)))
@@ -125,7 +127,7 @@ class Camera:
 
         triangle (..., 3, 3): corners by rows, world frame. Returns Box with low (..., 2), high (..., 2), valid (...).
         """
-        corners = _components(triangle, 3, "triangle")
+        corners = components(triangle, 3, "triangle")
         if corners.ndim < 2 or corners.shape[-1] != 3:
             raise InputError(f"triangle has shape {np.shape(triangle)}: (..., 3, 3) is needed, corners by rows")
         with _quiet():
@@ -146,7 +148,7 @@ class Camera:
 
     def contains(self, pixel: Array) -> Array:
         """Whether pixels (..., 2) lie inside the image rectangle."""
-        u, v = _components(pixel, 2, "pixel")
+        u, v = components(pixel, 2, "pixel")
         return (u >= 0) & (v >= 0) & (u <= self.width) & (v <= self.height)
 
     def with_pose(self, camera_from_world: Array) -> Self:
@@ -156,8 +158,7 @@ class Camera:
     @property
     def eye(self) -> np.ndarray:
         """Origin of the camera frame, (3,) in the world."""
-        pose = np.asarray(self.camera_from_world)
-        return -pose[:3, :3].T @ pose[:3, 3]
+        return frame_origin(self.camera_from_world)
 
     @property
     def world_to_camera(self) -> Any:
@@ -213,6 +214,21 @@ def register_pytrees() -> None:
             _register(model, tree_util)
 
 
+class _Fixed:
+    """A static field as JAX wants it: equal and hashed by value, arrays too."""
+
+    def __init__(self, value: Any):
+        self.value = value
+        array = isinstance(value, np.ndarray)
+        self._key = (value.shape, value.dtype.str, value.tobytes()) if array else value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Fixed) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
 def _register(model: type, tree_util: Any) -> None:
     names = given_fields(model)
     data = [name for name in names if name not in model.static_fields]
@@ -220,11 +236,12 @@ def _register(model: type, tree_util: Any) -> None:
 
     def flatten(camera: Any) -> tuple[list[Any], tuple[Any, ...]]:
         children = [(tree_util.GetAttrKey(name), getattr(camera, name)) for name in data]
-        return children, tuple(getattr(camera, name) for name in static)
+        return children, tuple(_Fixed(getattr(camera, name)) for name in static)
 
     def unflatten(fixed: tuple[Any, ...], children: Any) -> Any:
         camera = object.__new__(model)  # leaves may be placeholders, which no check would pass
-        for name, value in (*zip(static, fixed, strict=True), *zip(data, children, strict=True)):
+        values = (one.value for one in fixed)
+        for name, value in (*zip(static, values, strict=True), *zip(data, children, strict=True)):
             object.__setattr__(camera, name, value)
         return camera
 

@@ -25,6 +25,7 @@ class Orthographic(Camera):
     camera_from_world: Any = None
 
     central: ClassVar[bool] = False
+    parallel: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         self._check_frame()

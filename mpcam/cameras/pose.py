@@ -33,6 +33,12 @@ def look_at(eye: Array, target: Array, up: Array = (0.0, 0.0, 1.0)) -> np.ndarra
     return pose
 
 
+def frame_origin(pose: Array) -> np.ndarray:
+    """Origin of the camera frame, (3,) in the world."""
+    matrix = np.asarray(pose)
+    return -matrix[:3, :3].T @ matrix[:3, 3]
+
+
 def as_pose(matrix: Array | None) -> Array:
     """A checked 4x4 rigid transform; None is the identity, and JAX or Dr.Jit matrices pass unchecked.
 

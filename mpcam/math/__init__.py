@@ -18,6 +18,7 @@ from mpcam.math.arrays import safe_divide as safe_divide
 from mpcam.math.arrays import safe_sqrt as safe_sqrt
 from mpcam.math.arrays import sin as sin
 from mpcam.math.arrays import sqrt as sqrt
+from mpcam.math.arrays import take as take
 from mpcam.math.arrays import tan as tan
 from mpcam.math.arrays import where as where
 from mpcam.math.roots import central_slope as central_slope
@@ -30,6 +31,7 @@ from mpcam.math.vectors import dot as dot
 from mpcam.math.vectors import entry as entry
 from mpcam.math.vectors import norm as norm
 from mpcam.math.vectors import normalize as normalize
+from mpcam.math.vectors import plain as plain
 from mpcam.math.vectors import rotate as rotate
 from mpcam.math.vectors import rotate_back as rotate_back
 from mpcam.math.vectors import translation as translation

@@ -103,6 +103,22 @@ def where(condition: Array, x: Array, y: Array) -> Array:
     return functions.select(condition, x, y) if functions.__name__ == "drjit" else functions.where(condition, x, y)
 
 
+def take(table: Array, index: Array) -> Array:
+    """table[index] for a table (N,) and an array of whole numbers; NumPy tables go to the library of the index."""
+    if library(index) == "drjit":
+        dr = sys.modules["drjit"]
+        if library(table) == "numpy":
+            whole = table.dtype.kind in "iu"
+            kind = dr.int32_array_t(type(index)) if whole else dr.float32_array_t(type(index))
+            table = kind(np.ascontiguousarray(table, np.int32 if whole else np.float32))
+        return dr.gather(type(table), table, dr.uint32_array_t(type(index))(index))
+    if "jax" in (library(index), library(table)):
+        import jax.numpy as jnp
+
+        return jnp.asarray(table)[index]
+    return table[index]
+
+
 def detach(x: Array) -> Array:
     """The same value, without a derivative."""
     name = library(x)

@@ -5,7 +5,8 @@ from typing import Any
 
 from mpcam.math.arrays import Array, absolute, detach, epsilon, library, where
 
-_STEPS = 40
+STEPS = 40
+"""Steps that bisection alone needs to about 12 digits; Newton's need fewer."""
 
 
 def invert_increasing(
@@ -13,28 +14,13 @@ def invert_increasing(
 ) -> Array:
     """x in [low, high] with function(x) = value, for an increasing function.
 
-    Newton's step where it stays inside the bracket and is at most half the step before, bisection otherwise. Values
-    beyond the ends give the nearer end. The derivative comes from the implicit-function theorem (one Newton step on
-    detached arguments), never from the iterations.
+    By `bracketed_newton`. Values beyond the ends give the nearer end. The derivative comes from the implicit-function
+    theorem (one Newton step on detached arguments), never from the iterations.
     """
     target = detach(value)
     zero = 0.0 * (function(target * 0.0 + low) - target)  # of the type that the result has
     below, above = zero + low, zero + high
-    last_places = 4 * epsilon(below) * (above - below)  # at the root Newton's steps do not shrink any more
-
-    def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
-        below, above, x, step_before = state
-        residual = function(x) - target
-        below = where(residual <= 0, x, below)
-        above = where(residual > 0, x, above)
-        gradient = slope(x)
-        newton = x - residual / where(gradient > 0, gradient, 1.0)
-        usable = (gradient > 0) & (newton >= below) & (newton <= above)
-        usable = usable & (absolute(newton - x) <= 0.5 * step_before + last_places)
-        after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
-        return below, above, after, absolute(after - x)
-
-    _, _, x, _ = _repeat(step, (below, above, 0.5 * (below + above), above - below))
+    x = bracketed_newton(lambda x: function(x) - target, slope, below, above, 0.5 * (below + above))
     first, last = target <= function(zero + low), target >= function(zero + high)
     x = where(first, zero + low, where(last, zero + high, x))
     x, gradient = detach(x), detach(slope(x))
@@ -44,13 +30,46 @@ def invert_increasing(
     return where(inside & (gradient > 0), x - (step - detach(step)), x)
 
 
-def _repeat(step: Callable[[Any], Any], state: Any) -> Any:
+def bracketed_newton(
+    function: Callable[[Array], Array],
+    slope: Callable[[Array], Array],
+    below: Array,
+    above: Array,
+    start: Array,
+    steps: int = STEPS,
+    free: Array | None = None,
+) -> Array:
+    """Root in [below, above] of an increasing function that changes its sign there, from `start`; no derivative.
+
+    Newton's step where it stays inside the bracket and is at most half the step before, bisection otherwise. The three
+    arrays are of the type and shape that the result has. free: length of steps that need not shrink, by default the
+    last places of the bracket's width, since at the root rounding keeps Newton's steps from shrinking; the width itself
+    where the start is so good that Newton converges.
+    """
+    last_places = 4 * epsilon(below) * (above - below) if free is None else free
+
+    def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
+        below, above, x, step_before = state
+        residual = function(x)
+        below = where(residual <= 0, x, below)
+        above = where(residual > 0, x, above)
+        gradient = slope(x)
+        newton = x - residual / where(gradient > 0, gradient, 1.0)
+        usable = (gradient > 0) & (newton >= below) & (newton <= above)
+        usable = usable & (absolute(newton - x) <= 0.5 * step_before + last_places)
+        after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
+        return below, above, after, absolute(after - x)
+
+    return _repeat(step, (below, above, start, above - below), steps)[2]
+
+
+def _repeat(step: Callable[[Any], Any], state: Any, steps: int) -> Any:
     """The state after all steps; JAX compiles one step only."""
     if library(*state) == "jax":
         import jax
 
-        return jax.lax.fori_loop(0, _STEPS, lambda _, state: step(state), state)
-    for _ in range(_STEPS):
+        return jax.lax.fori_loop(0, steps, lambda _, state: step(state), state)
+    for _ in range(steps):
         state = step(state)
     return state
 

@@ -60,7 +60,11 @@ def normalize(a: Vector) -> Vector:
 
 def entry(matrix: Array, row: int, column: int) -> Array:
     """One entry of a matrix; as a Python float if it is a NumPy number, which would seize the arithmetic."""
-    value = matrix[row][column]
+    return plain(matrix[row][column])
+
+
+def plain(value: Array) -> Array:
+    """A NumPy number as a Python float, since it would seize the arithmetic; anything else as it is."""
     return float(value) if isinstance(value, (np.floating, np.integer)) else value
 
 

@@ -219,6 +219,6 @@ def _frozen_weights(test: str, width: int) -> Any:
     @frozen
     def weights(pixel: Any, triangle: Any, positions: Any, faces: Any, samples: Any) -> tuple[Any, Any]:
         views = decode.in_rows(type(samples), samples, pixel, width)
-        return decode.weights(types(), kernel_test(test), positions, faces, triangle, views)
+        return decode.weights(types(), kernel_test(test), positions, faces, triangle, views, types().Array4f)
 
     return weights

@@ -105,12 +105,19 @@ def lens_key(camera: Camera) -> tuple[Any, ...]:
     """What decides a camera's rays in its own frame: everything but the pose."""
     names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
     values = ((name, getattr(camera, name)) for name in names if name != "camera_from_world")
-    return (type(camera), *(v if name in camera.static_fields else _plain(v) for name, v in values))
+    return (type(camera), *(_plain(v) for _, v in values))
 
 
 def _plain(value: Any) -> Any:
-    """A number of any library, or a tuple of them, as Python floats: hashable, and the same for the same number."""
-    return tuple(_plain(v) for v in value) if isinstance(value, tuple) else float(value)
+    """A number of any library, a table of them or a tuple, in a form that is hashable, and the same for the same numbers."""
+    if isinstance(value, tuple):
+        return tuple(_plain(v) for v in value)
+    if value is None or isinstance(value, (str, int, Profile)):
+        return value
+    if np.ndim(value) > 0:
+        table = np.asarray(value)
+        return table.shape, table.dtype.str, table.tobytes()
+    return float(value)
 
 
 def device_lens(camera: Camera) -> Camera:
@@ -155,7 +162,8 @@ class Lens:
         from mpcam_kernels import samples
 
         _check_profile(getattr(camera, "profile", None))
-        self.on_device, self.size = device_lens(camera), (camera.width, camera.height)
+        alike = camera.central or camera.parallel  # others keep their tables, which kernels read in a form of their own
+        self.on_device, self.size = device_lens(camera) if alike else camera, (camera.width, camera.height)
         self.ray = self.on_device.local_ray(samples.pixel_centres(types(), camera.width, camera.height))
         dr.eval(self.ray)
 

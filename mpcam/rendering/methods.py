@@ -64,11 +64,15 @@ def prepare(
         settings = {**settings, "output": output}
     elif output != "hits":
         raise InputError(f"method={method!r} gives output='hits' only: use method='invert' for output={output!r}")
-    return _kind(method)(camera, mesh, **settings)
+    return _kind(method, camera)(camera, mesh, **settings)
 
 
-def _kind(method: str) -> Any:
-    """The class of a method; each is imported only when it is asked for."""
+def _kind(method: str, camera: Camera) -> Any:
+    """The class of a method for a camera; each is imported only when it is asked for."""
+    if method == "invert" and not (camera.central or camera.parallel):
+        from mpcam.rendering.bundled import Bundled
+
+        return Bundled
     if method == "invert":
         from mpcam.rendering.invert import Inverted
 

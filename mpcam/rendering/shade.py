@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.pose import frame_origin
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
@@ -169,7 +170,7 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
             data["origin"], data["depth"] = ray.origin, hits.device_depth  # pyright: ignore[reportPossiblyUnboundVariable]
         if shadows:
             data["face_normals"] = table.face_normals
-            data["shadows"] = [one.on_device(hits.camera.eye) for one in shadows]
+            data["shadows"] = [one.on_device(frame_origin(hits.camera.camera_from_world)) for one in shadows]
     kernel = _kernel(shading, kinds, table.smooth)
     return kernel(hits.device_triangle, weights, data)
 

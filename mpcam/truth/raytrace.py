@@ -14,6 +14,20 @@ from mpcam.truth.meshes import mitsuba_mesh, move, position_key
 from mpcam.truth.variant import mitsuba
 
 
+def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
+    """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
+    if not (camera.central or camera.parallel):
+        from mpcam.rendering.bundled import DeviceRays
+
+        return DeviceRays(camera, device).in_rows()
+    origin, direction, valid = lens(camera).ray
+    pose, scale = device.pose(camera), 1.0 / device.scale
+    moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
+    columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
+    world = [sum(columns[i][j] * moved[j] for j in range(3)) for i in range(3)]
+    return world, [sum(columns[i][j] * direction[j] for j in range(3)) for i in range(3)], valid
+
+
 class RayTraced:
     """Frames by tracing each pixel's ray through a tree over the triangles.
 
@@ -30,14 +44,8 @@ class RayTraced:
         self.camera, self.mesh = camera, mesh
         self.device: DeviceMesh = device_mesh(mesh)
         with mitsuba() as mi:
-            origin, direction, valid = lens(camera).ray
-            pose = self.device.pose(camera)
-            scale = 1.0 / self.device.scale
-            moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
-            columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
-            world = [mi.Float(sum(columns[i][j] * moved[j] for j in range(3))) for i in range(3)]
-            along = [mi.Float(sum(columns[i][j] * direction[j] for j in range(3))) for i in range(3)]
-            self._ray = mi.Ray3f(mi.Point3f(*world), mi.Vector3f(*along))
+            world, along, valid = rays_in_rows(camera, self.device)
+            self._ray = mi.Ray3f(mi.Point3f(*map(mi.Float, world)), mi.Vector3f(*map(mi.Float, along)))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
         self._build(mesh.vertices)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.pose import frame_origin
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.errors import InputError
 
@@ -139,7 +140,7 @@ def _sensor_class(mi: Any) -> type:
             return ray, dr.select(valid & active, weight, 0.0)
 
         def bbox(self) -> Any:
-            return mi.BoundingBox3f(mi.Point3f([float(x) for x in self.camera.eye]))
+            return mi.BoundingBox3f(mi.Point3f([float(x) for x in frame_origin(self.camera.camera_from_world)]))
 
         def to_string(self) -> str:
             return f"MpcamSensor[camera = {self.camera!r}]"

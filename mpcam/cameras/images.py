@@ -1,0 +1,91 @@
+"""Where points appear in camera triangles: every point in every triangle at once."""
+
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras import bent_rays, three_rays
+from mpcam.cameras.types import Projection
+from mpcam.math import Array, Vector, library, norm, take, vector, where
+
+
+def images_of(camera: Any, points: Array) -> Projection:
+    """`CameraTriangles.project`."""
+    from mpcam.cameras.base import components
+
+    with np.errstate(all="ignore"):
+        pixel, depth, valid = local_images(camera, camera.local(components(points, 3, "points")))
+    kind = library(depth)
+    if kind == "jax":
+        import jax.numpy as jnp
+
+        return Projection(jnp.moveaxis(pixel, 0, -1), depth, valid)
+    return Projection(np.moveaxis(pixel, 0, -1) if kind == "numpy" else pixel, depth, valid)
+
+
+def local_images(camera: Any, point: Vector) -> tuple[Any, Any, Any]:
+    """Pixels, depths and validity of all images of points (3, ...) in the camera frame.
+
+    NumPy and JAX: (2, ..., n), (..., n), (..., n) for n images per point; Dr.Jit: tuples of n.
+    """
+    if library(point) == "drjit":
+        return _on_device(camera, point)
+    face = np.arange(camera.count)
+    spread = point[..., None]
+    found = _in_triangles(camera, face, spread)
+
+    def joined(values: list[Any]) -> Any:
+        """One image after the other, triangle by triangle."""
+        if library(*values) == "jax":
+            import jax.numpy as jnp
+
+            return jnp.stack(jnp.broadcast_arrays(*values), -1).reshape(*point.shape[1:], -1)
+        return np.stack(np.broadcast_arrays(*values), -1).reshape(*point.shape[1:], -1)
+
+    u, v, depth, valid = (joined([image[i] for image in found]) for i in range(4))
+    return vector(u, v), depth, valid
+
+
+def _on_device(camera: Any, point: Vector) -> tuple[Any, Any, Any]:
+    """The same on Dr.Jit arrays: a lane for each point and triangle."""
+    import drjit as dr
+
+    whole, count = dr.uint32_array_t(type(point.x)), camera.count
+    lane = dr.arange(whole, dr.width(point) * count)
+    face, number = dr.int32_array_t(whole)(lane % count), lane // count
+    found = _in_triangles(camera, face, type(point)(*(dr.gather(type(part), part, number) for part in point)))
+    first = dr.arange(whole, dr.width(point)) * count
+    pixels, depths, valids = [], [], []
+    for triangle in range(count):
+        for u, v, depth, valid in found:
+            at = [dr.gather(type(values), values, first + triangle) for values in (u, v, depth, valid)]
+            pixels.append(vector(at[0], at[1]))
+            depths.append(at[2])
+            valids.append(at[3])
+    return tuple(pixels), tuple(depths), tuple(valids)
+
+
+def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, Array, Array, Array]]:
+    """Images of points in camera triangles: u, v, depth, validity of each that there may be."""
+    corners = [camera.corners(i) for i in range(3)]
+    places, rays = (tuple(_at(corner[k], face) for corner in corners) for k in range(2))
+    if camera.directions is not None:
+        images = three_rays.project(places, rays, point)
+        lengths = []
+        for image in images:
+            w3 = 1.0 - image.w1 - image.w2
+            weights = (image.w1, image.w2, w3)
+            lengths.append(norm(vector(*(sum(w * ray[k] for w, ray in zip(weights, rays, strict=True)) for k in range(3)))))
+        found = [(i.w2, 1.0 - i.w1 - i.w2, i.c * length, i.valid) for i, length in zip(images, lengths, strict=True)]
+    else:
+        found = bent_rays.project(camera.bend, places, rays, point)
+    result = []
+    for second, third, depth, valid in found:
+        u, v = camera.atlas.pixel(face, second, third)
+        result.append((where(valid, u, 0.0), where(valid, v, 0.0), where(valid, depth, 0.0), valid))
+    return result
+
+
+def _at(table: Vector, face: Array) -> Vector:
+    """Columns of a table (3, F) by number; all of them, untouched, where no number is needed."""
+    return vector(*(take(part, face) for part in table))

@@ -1,0 +1,274 @@
+"""The camera with three rays: where a point appears between the rays of a camera triangle.
+
+A camera triangle (Hou et al. 2006; the continuous 3-ray camera of Popescu et al. 2006) has corners v_i and directions
+d_i, and the ray of weights w leaves p(w) = sum w_i v_i along D(w) = sum w_i d_i. A point q appears at w if
+q = p(w) + c D(w). Then q lies in the plane of the swept triangle v_i + c d_i, so c is a root of a cubic, and there are
+three images at most.
+"""
+
+from typing import Any, NamedTuple
+
+from mpcam.math import Array, absolute, detach, epsilon, library, maximum, minimum, where
+from mpcam.math.cubic import Root, cubic_roots
+
+SLACK = 4.0
+"""Rounding that is forgiven at the edges of the triangle and at c = 0, in units of eps times the condition number."""
+
+LARGEST_SLACK = 2.0**-10
+"""The same at most, as a weight, and as a fraction of the distance."""
+
+RESIDUAL = 32.0
+"""Largest |p + c D - q| of an image, component by component, in units of eps times the sum of the magnitudes."""
+
+COLLAPSED = 16.0
+"""Swept triangles whose sine is below this many eps have collapsed; so have ray directions shorter than that."""
+
+FOLD = 16.0
+"""Where the scaled determinant of the derivatives is below this many eps, an image has no derivative."""
+
+POLISH = 2
+"""Newton's steps on all three unknowns, after the cubic."""
+
+FAR = 1e9
+"""Weights are kept within this, so that they do not overflow."""
+
+Triple = tuple[Any, Any, Any]
+
+
+class Image(NamedTuple):
+    """Weights of corners 1 and 2 (the third is 1 - w1 - w2), and c >= 0, so that q = p + c D; all 0 where invalid."""
+
+    w1: Array
+    w2: Array
+    c: Array
+    valid: Array
+
+
+def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
+    """The images of a point in a camera triangle, in rising order of c; any of the three may be invalid.
+
+    v, d: three corners and three directions, each of three components; q: a point. All components broadcast. Lengths of
+    d are free: they scale with 1 / c, and their ratios decide which camera it is. A point on the camera triangle
+    counts, at c = 0, and so does a weight that is negative by rounding only. Images where the ray's points form a
+    family of more than one (slits, centres, everything in one plane) are invalid, as are numbers that are none.
+
+    Derivatives with respect to v, d and q come from the implicit-function theorem (Newton's step on detached
+    arguments); they are zero where invalid and on folds (caustics), where they are infinite.
+    """
+    (v1, v2, v3), (d1, d2, d3) = v, d
+    given = [_triple(x) for x in (v1, v2, v3, d1, d2, d3, q)]
+    largest = _largest(*given)
+    limit = 1e15 if epsilon(largest) > 1e-10 else 1e100  # ratios of three such numbers do not overflow
+    fine = largest < limit
+    given = [_below(x, limit) for x in given]
+    corners, rays, point = given[:3], given[3:6], given[6]
+    fixed = [tuple(detach(x) for x in row) for row in given]
+    frame = _Scaled(fixed[:3], fixed[3:6], fixed[6])
+    roots = cubic_roots(*frame.cubic(), -LARGEST_SLACK, 1.0 / frame.eps)
+    some = fine & (frame.longest > 0) & (frame.farthest > 0)
+
+    def image(i: int) -> Image:
+        others = [roots[j] for j in range(3) if j != i]
+        return _differentiable(corners, rays, point, frame, frame.image(roots[i].root, some & roots[i].exists, others))
+
+    return image(0), image(1), image(2)
+
+
+def inside(w1: Array, w2: Array, slack: Array | float = 0.0) -> Array:
+    """Whether weights are those of a point in the triangle, up to a slack."""
+    return (w1 >= -slack) & (w2 >= -slack) & (1.0 - w1 - w2 >= -slack)
+
+
+class _Guess(NamedTuple):
+    """Unknowns near a solution, Newton's step for them, not yet taken, and how far rounding carries.
+
+    rows: of the inverse of the derivatives of the sum below; zero where `regular` does not hold. error: largest
+    component of that sum, relative to its terms. slack, slack_x: what is forgiven. direct: the ray has a direction.
+    """
+
+    w1: Array
+    w2: Array
+    x: Array
+    rows: tuple[Triple, Triple, Triple]
+    steps: Triple
+    error: Array
+    slack: Array
+    slack_x: Array
+    regular: Array
+    direct: Array
+
+
+class _Scaled:
+    """A triangle seen from the point, in units of the largest distance and of the longest direction; a constant.
+
+    The equations are sum w_i (a_i + x d_i) = 0 with x = c * longest / farthest. a: corners minus the point. e, f:
+    corners and directions 1 and 2 minus the third.
+    """
+
+    def __init__(self, corners: list[Triple], rays: list[Triple], point: Triple):
+        a = [_minus(corner, point) for corner in corners]
+        self.farthest, self.longest = _largest(*a), _largest(*rays)
+        self.per_distance = 1.0 / where(self.farthest > 0, self.farthest, 1.0)
+        self.per_length = 1.0 / where(self.longest > 0, self.longest, 1.0)
+        self.a, self.d = [_times(x, self.per_distance) for x in a], [_times(x, self.per_length) for x in rays]
+        self.e = [_times(_minus(corners[i], corners[2]), self.per_distance) for i in range(2)]
+        self.f = [_times(_minus(rays[i], rays[2]), self.per_length) for i in range(2)]
+        self.eps = epsilon(self.per_distance + self.per_length)
+
+    def cubic(self) -> tuple[Array, Array, Array, Array]:
+        """Coefficients of N . (a3 + x d3) with N = (e1 + x f1) x (e2 + x f2), up to a factor.
+
+        From the differences e and f, because a and d may be large beside them.
+        """
+        (e1, f1), (e2, f2) = [_scaled_together(self.e[i], self.f[i]) for i in range(2)]
+        n0, n1, n2 = _cross(e1, e2), _plus(_cross(e1, f2), _cross(f1, e2)), _cross(f1, f2)
+        a, d = self.a[2], self.d[2]
+        return _dot(n0, a), _dot(n1, a) + _dot(n0, d), _dot(n2, a) + _dot(n1, d), _dot(n2, d)
+
+    def image(self, x: Array, exists: Array, others: list[Root]) -> tuple[_Guess, Array]:
+        """The weights at a root of the cubic, polished together with it, and whether they are an image."""
+        now = self.guess(*self.weights(x), x)
+        for _ in range(POLISH):
+            trial = self.guess(now.w1 - now.steps[0], now.w2 - now.steps[1], now.x - now.steps[2])
+            better = now.regular & (trial.error <= now.error)
+            for root, there in others:  # each image stays with its own root
+                better = better & (~there | (absolute(trial.x - x) <= absolute(trial.x - root)))
+            now = _chosen(better, trial, now)
+        normal, _, _, alpha, beta = self.plane(now.x)
+        spread = [_largest(self.e[i]) + absolute(now.x) * _largest(self.f[i]) for i in range(2)]
+        flat = _largest(normal) * alpha * beta <= COLLAPSED * self.eps * spread[0] * spread[1]
+        valid = exists & ~flat & now.direct & (now.error <= RESIDUAL * self.eps)
+        return now, valid & inside(now.w1, now.w2, now.slack) & (now.x >= -now.slack_x)
+
+    def plane(self, x: Array) -> tuple[Triple, Triple, Triple, Array, Array]:
+        """Normal of the swept triangle, and the edges that it is the product of, scaled to 1, with their lengths."""
+        a, alpha = _unit(_along(self.e[0], x, self.f[0]))
+        b, beta = _unit(_along(self.e[1], x, self.f[1]))
+        return _cross(a, b), a, b, alpha, beta
+
+    def weights(self, x: Array) -> tuple[Array, Array]:
+        """Weights of the point of the swept triangle's plane that is nearest."""
+        normal, a, b, alpha, beta = self.plane(x)
+        p = _along(self.a[2], x, self.d[2])
+        square = _dot(normal, normal)
+        factor = 1.0 / where(square > self.eps * self.eps, square, 1.0)
+        w1, w2 = _dot(normal, _cross(b, p)) * factor / alpha, _dot(normal, _cross(p, a)) * factor / beta
+        return minimum(maximum(w1, -FAR), FAR), minimum(maximum(w2, -FAR), FAR)
+
+    def guess(self, w1: Array, w2: Array, x: Array) -> _Guess:
+        """Newton's step from here."""
+        w = (w1, w2, 1.0 - w1 - w2)
+        terms = [_along(self.a[i], x, self.d[i]) for i in range(3)]
+        value = _weighted(w, terms)
+        sizes = [_along(_absolute(self.a[i]), absolute(x), _absolute(self.d[i])) for i in range(3)]
+        size = _weighted(_absolute(w), sizes)
+        normal, a, b, alpha, beta = self.plane(x)
+        direction = _weighted(w, self.d)
+        longest = _largest(*[_times(self.d[i], w[i]) for i in range(3)])
+        d, gamma = _unit(direction)
+        det = _dot(normal, d)
+        regular = absolute(det) > FOLD * self.eps
+        per_det = where(regular, 1.0 / where(regular, det, 1.0), 0.0)
+        rows = (
+            _times(_cross(b, d), per_det / alpha),
+            _times(_cross(d, a), per_det / beta),
+            _times(normal, per_det / gamma),
+        )
+        forgiven = SLACK * self.eps
+        carried = [forgiven * _dot(_absolute(row), size) for row in rows]
+        relative = [absolute(u) / where(s > 0, s, 1.0) for u, s in zip(value, size, strict=True)]
+        return _Guess(
+            *(w1, w2, x, rows, (_dot(rows[0], value), _dot(rows[1], value), _dot(rows[2], value))),
+            error=maximum(maximum(relative[0], relative[1]), relative[2]),
+            slack=minimum(forgiven + maximum(carried[0], carried[1]), LARGEST_SLACK),
+            slack_x=minimum(forgiven + carried[2], LARGEST_SLACK),
+            regular=regular,
+            direct=_largest(direction) > COLLAPSED * self.eps * longest,
+        )
+
+
+def _differentiable(corners: list[Triple], rays: list[Triple], point: Triple, frame: _Scaled, image: Any) -> Image:
+    """The image in the caller's units, with the derivative of one Newton step."""
+    now, valid = image
+    unknowns, per_c = [now.w1, now.w2, maximum(now.x, 0.0)], frame.farthest * frame.per_length
+    if library(*unknowns) != "numpy":
+        w = (now.w1, now.w2, 1.0 - now.w1 - now.w2)
+        a = [_times(_minus(corner, point), frame.per_distance) for corner in corners]
+        value = _weighted(w, [_along(a[i], now.x * frame.per_length, rays[i]) for i in range(3)])
+        steps = [_dot(row, value) for row in now.rows]
+        unknowns = [u - (step - detach(step)) for u, step in zip(unknowns, steps, strict=True)]
+    w1, w2, x = [where(valid, u, 0.0) for u in unknowns]
+    return Image(w1, w2, x * per_c, valid)
+
+
+def _chosen(condition: Array, new: Any, old: Any) -> Any:
+    """`where` on nested tuples."""
+    if not isinstance(new, tuple):
+        return where(condition, new, old)
+    parts = [_chosen(condition, x, y) for x, y in zip(new, old, strict=True)]
+    return type(new)(*parts) if hasattr(new, "_fields") else tuple(parts)
+
+
+def _below(a: Triple, limit: float) -> Triple:
+    """The vector without components beyond a limit, and without those that are no numbers."""
+    x, y, z = [where(absolute(component) < limit, component, 0.0) for component in a]
+    return x, y, z
+
+
+def _triple(p: Any) -> Triple:
+    x, y, z = p
+    return x, y, z
+
+
+def _minus(a: Triple, b: Triple) -> Triple:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _plus(a: Triple, b: Triple) -> Triple:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _times(a: Triple, s: Array) -> Triple:
+    return a[0] * s, a[1] * s, a[2] * s
+
+
+def _along(a: Triple, s: Array, b: Triple) -> Triple:
+    """a + s b."""
+    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
+
+
+def _weighted(w: Triple, a: list[Triple]) -> Triple:
+    return _plus(_plus(_times(a[0], w[0]), _times(a[1], w[1])), _times(a[2], w[2]))
+
+
+def _absolute(a: Triple) -> Triple:
+    return absolute(a[0]), absolute(a[1]), absolute(a[2])
+
+
+def _dot(a: Triple, b: Triple) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _largest(*vectors: Triple) -> Array:
+    """Largest magnitude of all components."""
+    result = absolute(vectors[0][0])
+    for x in [x for vector in vectors for x in vector][1:]:
+        result = maximum(result, absolute(x))
+    return result
+
+
+def _unit(a: Triple) -> tuple[Triple, Array]:
+    """The vector with largest component 1, and its factor; a zero vector stays as it is."""
+    length = _largest(a)
+    length = where(length > 0, length, 1.0)
+    return _times(a, 1.0 / length), length
+
+
+def _scaled_together(a: Triple, b: Triple) -> tuple[Triple, Triple]:
+    length = _largest(a, b)
+    factor = 1.0 / where(length > 0, length, 1.0)
+    return _times(a, factor), _times(b, factor)

@@ -1,0 +1,26 @@
+"""Order along a space-filling curve, so that neighbours in space are neighbours in memory."""
+
+import numpy as np
+
+BITS = 10
+
+
+def interleaved(cells: np.ndarray) -> np.ndarray:
+    """Morton numbers (N,) of whole coordinates (N, 2) or (N, 3) below 2**BITS."""
+    dimensions = cells.shape[1]
+    result = np.zeros(len(cells), np.int64)
+    for axis in range(dimensions):
+        for bit in range(BITS):
+            result |= (cells[:, axis].astype(np.int64) >> bit & 1) << (bit * dimensions + axis)
+    return result
+
+
+def nearby(points: np.ndarray) -> np.ndarray:
+    """Numbers of points (N, 3) such that those next to each other lie close together; points that are not finite last."""
+    finite = np.isfinite(points).all(axis=1)
+    some = points[finite]
+    low, high = (some.min(0), some.max(0)) if len(some) else (np.zeros(3), np.ones(3))
+    extent = float((high - low).max()) or 1.0
+    cells = np.zeros(points.shape, np.int64)
+    cells[finite] = np.minimum((some - low) / extent * (1 << BITS), (1 << BITS) - 1).astype(np.int64)
+    return np.argsort(np.where(finite, interleaved(cells), np.iinfo(np.int64).max), kind="stable")

@@ -1,0 +1,283 @@
+"""Exact rasterization where rays have no common centre: candidates by a hierarchy of bundles, then inversion per pixel."""
+
+import copy
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.pose import frame_origin
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.order import nearby
+from mpcam.math import cross, normalize
+from mpcam.rendering.clock import Clock
+from mpcam.rendering.device import DeviceMesh, device_mesh, opaque_numbers, types
+from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.layout import Layout, layout
+from mpcam.rendering.maps import CoverageMap, DepthMap
+
+
+class Bundled:
+    """Frames of camera triangles over a mesh.
+
+    output: "hits", "depth" or "coverage".
+    """
+
+    method = "invert"
+
+    @exclusive
+    def __init__(self, camera: CameraTriangles, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"):
+        if cull != "none":
+            raise InputError(f"cull={cull!r}: camera triangles show both sides, use cull='none'")
+        if bound != "tight":
+            raise InputError(f"bound={bound!r} is not for camera triangles: use bound='tight'")
+        self.mesh, self.output, self.bound = mesh, output, bound
+        self.device = device_mesh(mesh)
+        self.vertices, self.faces = self.device.vertices, self.device.faces
+        self.tree = _tree(mesh)
+        self.unit = opaque_numbers([self.device.scale])[0]
+        self.aim(camera)
+
+    @exclusive
+    def aim(self, camera: CameraTriangles) -> None:
+        """Another camera, for frames in which the eye or the mirror moves."""
+        self.camera = camera
+        self.rays = DeviceRays(camera, self.device)
+
+    @exclusive
+    def update(self, vertices: np.ndarray) -> None:
+        """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
+        self.vertices = self.device.place(np.asarray(vertices))
+
+    def run(self, done: Callable[[str, Any], None] | None = None, count: bool = False) -> tuple[Any, Any]:
+        """Keys of all places, and counters or None; done(stage, arrays) is told of each stage."""
+        from mpcam_kernels.backend import backend_name
+
+        kernels = _pipeline(self.output, count, backend_name())
+        rays = self.rays
+        return kernels.frame(self.vertices, self.faces, self.tree, rays.bundle, rays.layout.blocks, rays.fan, done)
+
+    @exclusive
+    def frame(self) -> Any:
+        """One frame, evaluated: Hits, DepthMap or CoverageMap."""
+        return self._decoded(self.run()[0])
+
+    @exclusive
+    def stages(self) -> dict[str, float]:
+        """Seconds of one frame by stage."""
+        clock = Clock()
+        keys, _ = self.run(clock.done)
+        self._decoded(keys)
+        clock.done("decode")
+        return clock.seconds
+
+    def _decoded(self, keys: Any) -> Any:
+        place = self.rays.place
+        found = _frozen_decode(self.output)(place, keys, self.unit)
+        if self.output == "depth":
+            return DepthMap(self.camera, found[0])
+        if self.output == "coverage":
+            return CoverageMap(self.camera, found[0], place >= 0)
+        triangle, depth = found
+        vertices, rays = self.vertices, self.rays
+
+        def weights() -> tuple[Any, Any]:
+            if self.mesh.triangle_count == 0:
+                return depth * 0.0, depth * 0.0
+            return _frozen_weights()(place, triangle, vertices, self.faces, rays.bundle.pixels)
+
+        def stats() -> Stats:
+            if self.mesh.triangle_count == 0:
+                return Stats(0, 0)
+            tests, rendered = self._count(vertices, rays)
+            return Stats(int(tests), int(rendered))
+
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+
+    @exclusive
+    def _count(self, vertices: Any, rays: "DeviceRays") -> np.ndarray:
+        """Tests and covered pixels of a frame over vertices and rays that may have been replaced since."""
+        other = copy.copy(self)
+        other.vertices, other.rays = vertices, rays
+        return other.run(count=True)[1].numpy()
+
+
+class DeviceRays:
+    """Rays of camera triangles in the frame of a device mesh: world axes, from its anchor, in units of its scale.
+
+    bundle: rays by place, with bounds. place: Int, of each pixel row by row, -1 where a pixel has no ray.
+    """
+
+    def __init__(self, camera: CameraTriangles, device: DeviceMesh):
+        t = types()
+        self.layout: Layout = layout(camera.atlas)
+        self.fan = int(self.layout.count.max())
+        fixed = _on_device(self.layout, camera.atlas)
+        self.place = fixed["place"]
+        pose = np.asarray(camera.camera_from_world, np.float64)
+        centre = frame_origin(pose) - device.anchor
+        corners = [camera.corners(i) for i in range(3)]
+        places = [(pose[:3, :3].T @ np.asarray(place) + centre[:, None]) / device.scale for place, _ in corners]
+        turned = [pose[:3, :3].T @ np.asarray(along) for _, along in corners]
+        table = np.stack([values for pair in zip(places, turned, strict=True) for values in pair])  # (6, 3, F)
+        rows = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel())
+        bent: dict[str, Any] = {}
+        if camera.directions is None:
+            eye = (pose[:3, :3].T @ np.asarray(camera.eye, np.float64) + centre) / device.scale
+            bent["eye"] = opaque_numbers(list(eye))
+            if camera.index is not None:
+                bent["index"] = opaque_numbers([float(camera.index)])[0]
+        self.bundle = _frozen_rays(camera.kind)(*fixed["lanes"], fixed, rows, bent)
+
+    def in_rows(self) -> tuple[Any, Any, Any]:
+        """Origin, direction and validity of every pixel's ray, row by row, in the mesh's frame."""
+        import drjit as dr
+
+        t, pixels = types(), self.bundle.pixels
+        valid = self.place >= 0
+        number = t.UInt(dr.maximum(self.place, 0))
+        ray = [dr.gather(t.Float, values, number) for values in pixels]
+        direction, origin = t.Array3f(*ray[:3]), t.Array3f(*ray[6:])
+        valid = valid & (dr.squared_norm(direction) > 0)
+        return origin, dr.select(valid, direction, t.Array3f(0, 0, 1)), valid
+
+
+@functools.lru_cache(maxsize=8)
+def _on_device(found: Layout, atlas: Any) -> dict[str, Any]:
+    """What of the layout kernels need."""
+    import drjit as dr
+
+    from mpcam_kernels.samples import PIXELS
+
+    t = types()
+    arrays = {"face": found.face, "x": found.x, "y": found.y, "first": found.first, "count": found.count}
+    fixed: dict[str, Any] = {name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()}
+    fixed["side"] = t.UInt(np.ascontiguousarray(atlas.sides[found.face], np.uint32))
+    fixed["place"] = t.Int(found.places)
+    fixed["lanes"] = [dr.arange(t.UInt, n) for n in (found.blocks * PIXELS, found.blocks, len(found.first))]
+    dr.make_opaque(fixed)
+    return fixed
+
+
+@functools.cache
+def _frozen_rays(kind: str) -> Any:
+    """Kernels from tables of camera triangles to rays and their bounds. kind: see `CameraTriangles.kind`."""
+    import drjit as dr
+
+    from mpcam_kernels.bundles import Bundle, Cones, bounds, joined
+    from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.samples import PIXELS
+    from mpcam_kernels.skew import Rays
+
+    @frozen
+    def rays(place: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Rays:
+        t = types()
+        block = place // PIXELS
+        face, side = dr.gather(t.UInt, fixed["face"], block), dr.gather(t.UInt, fixed["side"], block)
+        x = dr.gather(t.UInt, fixed["x"], block) + ((place >> 4) & 3) * 4 + (place & 3)
+        y = dr.gather(t.UInt, fixed["y"], block) + ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+        last = t.Float(side) - 1
+        second, third = t.Float(x) / last, t.Float(y) / last
+        table = [dr.gather(t.Array3f, rows, face * 6 + k) for k in range(6)]
+        origin, along = table[0], table[1]
+        for weight, at in ((second, 2), (third, 4)):
+            origin = origin + weight * (table[at] - table[0])
+            along = along + weight * (table[at + 1] - table[1])
+        camera = _bender(kind, bent)
+        direction, valid = camera.bend(origin, along)
+        direction = normalize(direction)
+        valid = valid & (x + y < side) & dr.isfinite(direction.x + direction.y + direction.z)
+        direction, origin = dr.select(valid, direction, 0), dr.select(valid, origin, 0)
+        return Rays(*direction, *cross(origin, direction), *origin)
+
+    @frozen
+    def bound(block: Any, pixels: Rays) -> tuple[list[Any], list[Any]]:
+        cones, slopes = bounds(types(), pixels, block)
+        return [dr.ravel(row) for row in cones], [dr.ravel(row) for row in slopes]
+
+    @frozen
+    def group(number: Any, cones: Any, first: Any, count: Any) -> list[Any]:
+        return [dr.ravel(row) for row in joined(types(), cones, first, count)]
+
+    def bundle(places: Any, block: Any, groups: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Bundle:
+        used = {name: fixed[name] for name in ("face", "side", "x", "y")}
+        pixels = rays(places, used, rows, bent)
+        cones, slopes = bound(block, pixels)
+        cones = Cones(cones)
+        around = group(groups, cones, fixed["first"], fixed["count"])
+        return Bundle(pixels, cones, slopes, Cones(around), fixed["first"], fixed["count"])
+
+    return bundle
+
+
+def _bender(kind: str, bent: dict[str, Any]) -> CameraTriangles:
+    """What bends the rays inside of a kernel: a camera with nothing but its eye and index, on the device."""
+    camera = object.__new__(CameraTriangles)
+    fields = {"directions": kind == "direct" or None, "eye": bent.get("eye"), "index": bent.get("index")}
+    for name, value in fields.items():
+        object.__setattr__(camera, name, value)
+    return camera
+
+
+def _tree(mesh: Mesh) -> Any:
+    """The triangles in an order that puts neighbours together, and the sizes of the levels of clusters above."""
+    from mpcam_kernels.bundle_pipeline import Tree
+    from mpcam_kernels.hierarchy import FAN
+
+    with np.errstate(invalid="ignore", over="ignore"):
+        order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
+    counts = [mesh.triangle_count]
+    while len(counts) < 2 or (counts[-1] > 64 and len(counts) < 5):
+        counts.append(-(-counts[-1] // FAN))
+    return Tree(types().UInt(order.astype(np.uint32)), tuple(counts))
+
+
+@functools.lru_cache(maxsize=8)
+def _pipeline(output: str, count: bool, backend: str) -> Any:
+    from mpcam_kernels.bundle_pipeline import BundlePipeline
+
+    return BundlePipeline(types(), output=output, count=count)
+
+
+@functools.cache
+def _frozen_decode(output: str) -> Any:
+    """Kernel from keys to what a frame holds, pixels row by row."""
+    import drjit as dr
+
+    from mpcam_kernels import decode
+    from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.outputs import OUTPUTS as KINDS
+
+    kind = KINDS[output]
+
+    @frozen
+    def decoded(place: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
+        t = types()
+        found = dr.gather(kind.kind(t), keys, t.UInt(dr.maximum(place, 0)), place >= 0)
+        if output == "coverage":
+            return (found != 0,)
+        depth = decode.depths(t, kind, found, unit)
+        return (depth,) if output == "depth" else (decode.triangles(t, kind, found), depth)
+
+    return decoded
+
+
+@functools.cache
+def _frozen_weights() -> Any:
+    import drjit as dr
+
+    from mpcam_kernels import decode, skew
+    from mpcam_kernels.bundles import gathered
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def weights(place: Any, triangle: Any, vertices: Any, faces: Any, pixels: Any) -> tuple[Any, Any]:
+        t = types()
+        views = gathered(pixels, t, t.UInt(dr.maximum(place, 0)), place >= 0)
+        return decode.weights(t, skew, vertices, faces, triangle, views, t.Array3f)
+
+    return weights
