@@ -57,9 +57,19 @@ def through_lists(
             inside += [within & (types.Int(x + k) >= first) & (types.Int(x + k) < last) for k in range(4)]
         return inside
 
+    def sought(index: Any) -> Any:
+        """The next entry for the lane's part: looking on is cheap, a test with most lanes idle is not."""
+
+        def look(index: Any, found: Any) -> Any:
+            bits = dr.gather(types.UInt, lists.entries, 2 * index + 1, index < end)
+            found = ((bits >> part) & 1) != 0
+            return dr.select(found, index, index + 1), found
+
+        return dr.while_loop((index, types.Bool(False)), lambda index, found: ~found & (index < end), look)[0]
+
     def body(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        name, bits = dr.gather(types.Array2u, lists.entries, index)
-        mask, triangle = ((bits >> part) & 1) != 0, name
+        name, mask = dr.gather(types.UInt, lists.entries, 2 * index), True
+        triangle = name
         if bounded:
             triangle = dr.reinterpret_array(types.UInt, dr.gather(types.Float, large.regions[2], name * 4 + 3))
         shape = set_up(types, test, large, triangle)
@@ -79,7 +89,7 @@ def through_lists(
                 nearest.append(best[k] | covered)
             if count:
                 tests, hits = tests + dr.select(possible, types.UInt(1), 0), hits + dr.select(covered, 1, 0)
-        return nearest, first, tests, hits, index + 1
+        return nearest, first, tests, hits, sought(index + 1)
 
     def unfinished(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
         return (index < end) if output.depth else (index < end) & ~functools.reduce(operator.and_, best)
@@ -87,7 +97,7 @@ def through_lists(
     # A test of nearness 0 is no hit, but ties with nothing, which has it too: such an owner is masked below.
     owners = [output.triangle(types, key) for key in before] if hasattr(output, "triangle") else []
     best = [output.nearness(types, key) if output.depth else key > 0 for key in before]
-    state = (best, owners, types.UInt(0), types.UInt(0), start)
+    state = (best, owners, types.UInt(0), types.UInt(0), sought(start))
     best, owners, tests, hits, _ = dr.while_loop(state, unfinished, body)
     if output.depth:
         keys = [output.key(types, near, owners[k] if owners else None) for k, near in enumerate(best)]

@@ -21,6 +21,9 @@ from mpcam.rendering.layout import Layout, layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
 
 
+FEW = 256  # balls that are held against every group of blocks: more of them get clusters
+
+
 class Bundled:
     """Frames of camera triangles over a mesh.
 
@@ -231,7 +234,7 @@ def _tree(mesh: Mesh) -> Any:
     with np.errstate(invalid="ignore", over="ignore"):
         order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
     counts = [mesh.triangle_count]
-    while len(counts) < 2 or (counts[-1] > 64 and len(counts) < 5):
+    while counts[-1] > FEW and len(counts) < 5:
         counts.append(-(-counts[-1] // FAN))
     return Tree(types().UInt(order.astype(np.uint32)), tuple(counts))
 
