@@ -5,37 +5,52 @@ block and a triangle; where no edge excludes all rays of a part of the block, it
 frame to frame but the order of the triangles, so scenes move freely.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import hierarchy, pixels, skew
+from mpcam_kernels import hierarchy, pixels, planes, skew
 from mpcam_kernels.blocks import Large, Lists, Pairs, list_pairs
-from mpcam_kernels.bundles import Bundle
+from mpcam_kernels.bundles import Bundle, Cones, joined, room, stored
 from mpcam_kernels.frozen import frozen
+from mpcam_kernels.hierarchy import FAN, ROOM, Found
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.samples import PIXELS, Samples
 
 LANES = 1 << 22  # at a time
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
+CULLING = ("objects", "triangles")
 
 
 @dataclass(frozen=True)
-class Tree:
-    """order: numbers of the triangles, neighbours close together; counts: triangles, then clusters level by level."""
+class Task:
+    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle; order: their numbers, neighbours close
+    together; counts: triangles, then clusters level by level; bundle: the rays, with so many blocks, at most `fan` of
+    them in a group.
+    """
 
+    vertices: Any
+    faces: Any
     order: Any
     counts: tuple[int, ...]
+    bundle: Bundle
+    blocks: int
+    fan: int
 
 
 class BundlePipeline:
-    """The kernels of one output; frozen. output: "hits", "depth" or "coverage". count: also count tests and hits."""
+    """The kernels of one output; frozen.
 
-    def __init__(self, types: Any, *, output: str = "hits", count: bool = False):
-        self.types, self.output, self.count = types, OUTPUTS[output], count
+    output: "hits", "depth" or "coverage". count: also count tests and hits. culling: what is left out early (Hou et al.
+    2006, section 2.4): "objects" holds clusters of triangles against bundles of rays, "triangles" each triangle by
+    itself; without them all pairs are looked at.
+    """
+
+    def __init__(self, types: Any, *, output: str = "hits", count: bool = False, culling: tuple[str, ...] = CULLING):
+        self.types, self.output, self.count, self.culling = types, OUTPUTS[output], count, culling
         self._set_up = frozen(self._set_up_pass)
         self._clusters = frozen(self._cluster_pass)
         self._first = frozen(self._first_pass)
@@ -45,103 +60,105 @@ class BundlePipeline:
         self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
 
-    def frame(
-        self,
-        vertices: Any,
-        faces: Any,
-        tree: Tree,
-        bundle: Bundle,
-        blocks: int,
-        fan: int,
-        done: Callable[[str, Any], None] | None = None,
-    ) -> tuple[Any, Any]:
+    def frame(self, task: Task, done: Callable[[str, Any], None] | None = None) -> tuple[Any, Any]:
         """Keys of all places (see `outputs`), and counters (tests, hits) or None.
 
-        vertices: 3 numbers each. faces: 3 UInts per triangle. blocks: how many there are; fan: most of them in a group.
         done(stage, arrays) is told after each pass.
         """
-        types = self.types
-        tell = done or (lambda stage, arrays: None)
+        types, tell = self.types, done or (lambda stage, arrays: None)
         counters = dr.zeros(types.UInt64, 2) if self.count else None
-        buffer = dr.zeros(self.output.kind(types), blocks * PIXELS)
+        buffer = dr.zeros(self.output.kind(types), task.blocks * PIXELS)
         dr.make_opaque(buffer)
-        if not tree.counts[0] or not blocks:
+        if not task.counts[0] or not task.blocks:
             return buffer, counters
-        rows = [dr.empty(types.Float, 4 * tree.counts[0]) for _ in range(skew.ROWS + 1)]
-        *setups, balls = self._set_up(lanes(types, 0, tree.counts[0]), vertices, faces, rows)
-        levels = [balls]
-        for level, count in enumerate(tree.counts[1:]):
-            room = dr.empty(types.Float, 4 * count)
-            order = tree.order if level == 0 else None
-            levels.append(self._clusters(lanes(types, 0, count), levels[-1], order, tree.counts[level], room))
+        setups, levels = self._triangles(task)
         tell("triangles", (setups, levels))
-        groups = dr.width(bundle.first)
-        state = [buffer, counters]
-
-        def finish(found: Any, number: int) -> None:
-            step = hierarchy.ROOM
-            for start in range(0, number, step):
-                pairs = self._blocks(
-                    lanes(types, start, min(number, start + step)), bundle, setups, found, dr.zeros(types.UInt, blocks)
-                )
-                many = pairs.found[0]
-                tell("blocks", pairs)
-                if not many:
-                    continue
-                lists = Lists(dr.empty(types.UInt, 2 * many), dr.prefix_sum(pairs.counts), pairs.counts)
-                lists = self._list(lanes(types, 0, many), pairs, lists)
-                tell("lists", lists)
-                everywhere = lanes(types, 0, blocks * PIXELS // pixels.PER_LANE)
-                state[:] = self._pixels(everywhere, bundle, setups, lists, *state)
-                tell("pixels", state[0])
-
-        def down(level: int, by_group: bool, found: Any, number: int) -> None:
-            """From pairs with balls of a level on."""
-            if level == 0 and not by_group:
-                finish(found, number)
-                return
-            split = by_group and (level == 0 or hierarchy.FAN**level <= GROUPED)
-            fan_out = fan if split else hierarchy.FAN
-            start, step = 0, max(1, LANES // fan_out)
-            while start < number:
-                step = min(step, number - start)
-                lane = lanes(types, start * fan_out, (start + step) * fan_out)
-                if split:
-                    after = self._groups(lane, fan, bundle, levels[level], found)
-                else:
-                    cones = bundle.groups if by_group else bundle.cones
-                    order = tree.order if level == 1 else None
-                    after = self._children(lane, cones, levels[level - 1], tree.counts[level - 1], found, order)
-                many = after.found[0]
-                if many > hierarchy.ROOM and step > 1:
-                    step = max(1, step // (1 + many // hierarchy.ROOM))
-                    continue
-                tell("candidates", after)
-                if many:
-                    down(level if split else level - 1, by_group and not split, after, many)
-                start += step
-
-        top = len(levels) - 1
-        start, step, total = 0, LANES, groups * tree.counts[top]
-        while start < total:
-            step = min(step, total - start)
-            found = self._first(lanes(types, start, start + step), bundle.groups, levels[top], tree.counts[top])
-            many = found.found[0]
-            if many > hierarchy.ROOM:
-                step = max(1, step // (1 + many // hierarchy.ROOM))
+        everywhere = lanes(types, 0, task.blocks * PIXELS // pixels.PER_LANE)
+        for pairs, rows in self.pairs(task, setups, levels, tell):
+            many = pairs.found[0]
+            tell("blocks", pairs)
+            if not many:
                 continue
-            tell("candidates", found)
-            if many:
-                down(top, True, found, many)
-            start += step
-        return state[0], state[1]
+            lists = Lists(dr.empty(types.UInt, 2 * many), dr.prefix_sum(pairs.counts), pairs.counts)
+            lists = self._list(lanes(types, 0, many), pairs, lists)
+            tell("lists", lists)
+            buffer, counters = self._pixels(everywhere, task.bundle, Large(rows, setups, None), lists, buffer, counters)
+            tell("pixels", buffer)
+        return buffer, counters
+
+    def _triangles(self, task: Task) -> tuple[list[Any], list[Any]]:
+        """Set-ups of the triangles, and the balls around them and, level by level, around clusters."""
+        types, counts = self.types, task.counts
+        rows = [dr.empty(types.Float, 4 * counts[0]) for _ in range(skew.ROWS + 1)]
+        *setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, rows)
+        levels = [balls]
+        for level, count in enumerate(counts[1:] if "objects" in self.culling else ()):
+            order, room = task.order if level == 0 else None, dr.empty(types.Float, 4 * count)
+            levels.append(self._clusters(lanes(types, 0, count), levels[-1], order, counts[level], room))
+        return setups, levels
+
+    def pairs(self, task: Task, setups: list[Any], levels: list[Any], tell: Any) -> Iterator[tuple[Pairs, list[Any]]]:
+        """Pairs of a block and a triangle, in chunks, and what rows of regions they name (none here)."""
+        for found, number in self.met(task, task.bundle.groups, levels, True, tell):
+            for start in range(0, number, ROOM):
+                lane = lanes(self.types, start, min(number, start + ROOM))
+                yield self._blocks(lane, task.bundle, setups, found, dr.zeros(self.types.UInt, task.blocks)), []
+
+    def met(self, task: Task, cones: Cones, levels: list[Any], split: bool, tell: Any) -> Iterator[tuple[Found, int]]:
+        """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
+
+        cones: of the bundles to begin with; split: they are groups, and blocks take their place on the way down.
+        """
+        types, top = self.types, len(levels) - 1
+        bundles = dr.width(cones.rows[0]) // 4
+
+        def passed(fan: int, number: int, step: Callable[[Any], Found]) -> Iterator[tuple[Found, int]]:
+            """A step over all pairs, a lane for each of their `fan` children, in chunks whose results there is room for."""
+            start, many = 0, max(1, LANES // fan)
+            while start < number:
+                many = min(many, number - start)
+                found = step(lanes(types, start * fan, (start + many) * fan))
+                kept = found.found[0]
+                if kept > ROOM:
+                    many = max(1, many // (1 + kept // ROOM))
+                    continue
+                tell("candidates", found)
+                if kept:
+                    yield found, kept
+                start += many
+
+        def down(level: int, groups: bool, found: Found, number: int) -> Iterator[tuple[Found, int]]:
+            if level == 0 and not groups:
+                yield found, number
+                return
+            if groups and (level == 0 or FAN**level <= GROUPED):
+                balls, cull = levels[level], self._culls(level)
+                for after in passed(
+                    task.fan, number, lambda lane: self._groups(lane, task.fan, task.bundle, balls, found, cull)
+                ):
+                    yield from down(level, False, *after)
+                return
+            around = task.bundle.groups if groups else task.bundle.cones if split else cones
+            order, below, count = task.order if level == 1 else None, levels[level - 1], task.counts[level - 1]
+            cull = self._culls(level - 1)
+            for after in passed(
+                FAN, number, lambda lane: self._children(lane, around, below, count, found, order, cull)
+            ):
+                yield from down(level - 1, groups, *after)
+
+        count, cull = task.counts[top], self._culls(top)
+        for after in passed(1, bundles * count, lambda lane: self._first(lane, cones, levels[top], count, cull)):
+            yield from down(top, split, *after)
+
+    def _culls(self, level: int) -> bool:
+        return "triangles" in self.culling if level == 0 else True
 
     def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, rows: list[Any]) -> list[Any]:
         types = self.types
         corners = dr.gather(types.Array3u, faces, triangle)
-        points = [dr.gather(types.Array3f, vertices, corner) for corner in corners]
-        shape = skew.setup(*points)
-        ball = hierarchy.triangle_balls(types, tuple(points), shape.usable)  # pyright: ignore[reportArgumentType]
+        a, b, c = (dr.gather(types.Array3f, vertices, corner) for corner in corners)
+        shape = skew.setup(a, b, c)
+        ball = hierarchy.triangle_balls(types, (a, b, c), shape.usable)
         for target, row in zip(rows, (*skew.pack(types, shape), ball), strict=True):
             dr.scatter(target, row, triangle)
         return rows
@@ -150,33 +167,90 @@ class BundlePipeline:
         dr.scatter(room, hierarchy.cluster_balls(self.types, cluster, balls, order, count), cluster)
         return room
 
-    def _first_pass(self, lane: Any, cones: Any, balls: Any, clusters: int) -> hierarchy.Found:
-        return hierarchy.first_pairs(self.types, lane, cones, balls, clusters)
+    def _first_pass(self, lane: Any, cones: Any, balls: Any, clusters: int, cull: bool) -> Found:
+        return hierarchy.first_pairs(self.types, lane, cones, balls, clusters, cull)
 
-    def _group_pass(self, lane: Any, fan: int, bundle: Bundle, balls: Any, before: hierarchy.Found) -> hierarchy.Found:
-        return hierarchy.refine_groups(self.types, lane, fan, bundle, balls, before)
+    def _group_pass(self, lane: Any, fan: int, bundle: Bundle, balls: Any, before: Found, cull: bool) -> Found:
+        return hierarchy.refine_groups(self.types, lane, fan, bundle, balls, before, cull)
 
     def _child_pass(
-        self, lane: Any, cones: Any, balls: Any, count: int, before: hierarchy.Found, order: Any
-    ) -> hierarchy.Found:
-        return hierarchy.refine_clusters(self.types, lane, cones, balls, count, before, order)
+        self, lane: Any, cones: Any, balls: Any, count: int, before: Found, order: Any, cull: bool
+    ) -> Found:
+        return hierarchy.refine_clusters(self.types, lane, cones, balls, count, before, order, cull)
 
-    def _block_pass(
-        self, lane: Any, bundle: Bundle, setups: list[Any], before: hierarchy.Found, counts: Any
-    ) -> Pairs:
+    def _block_pass(self, lane: Any, bundle: Bundle, setups: list[Any], before: Found, counts: Any) -> Pairs:
         return hierarchy.block_pairs(self.types, skew, lane, bundle, setups, before, counts)
 
     def _list_pass(self, lane: Any, pairs: Pairs, lists: Lists) -> Lists:
         return list_pairs(self.types, lane, pairs, lists)
 
     def _pixel_pass(
-        self, lane: Any, bundle: Bundle, setups: list[Any], lists: Lists, buffer: Any, counters: Any
+        self, lane: Any, bundle: Bundle, large: Large, lists: Lists, buffer: Any, counters: Any
     ) -> tuple[Any, Any]:
         samples = Samples(bundle.pixels, None, None)  # pyright: ignore[reportArgumentType]
+        corner = self._corner(bundle)
         keys, *counted = pixels.through_lists(
-            self.types, skew, self.output, lane, samples, Large([], setups, None), lists, buffer, (1, 1), False, self.count
+            self.types, skew, self.output, lane, samples, large, lists, buffer, corner, bool(large.regions), self.count
         )
         if self.count:
             for slot, value in enumerate(counted):
                 dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(value), self.types.UInt(slot))
         return keys, counters
+
+    def _corner(self, bundle: Bundle) -> Callable[[Any], tuple[Any, Any]]:
+        """A function from places to their column and row within their camera triangle."""
+
+        def at(place: Any) -> tuple[Any, Any]:
+            block = place // PIXELS
+            x, y = (dr.gather(self.types.UInt, values, block) for values in bundle.corners)
+            return x + ((place >> 4) & 3) * 4 + (place & 3), y + ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+
+        return at
+
+
+class PlanePipeline(BundlePipeline):
+    """Candidates by the bounds of Hou et al. 2006 on the camera triangles' planes; all pixels inside are tested.
+
+    bound: "triangle" or "nine_point". With "objects" in `culling`, camera triangles are held against clusters first;
+    with "triangles", regions that hold no pixel of the camera triangle are dropped before anything else is done.
+    """
+
+    def __init__(self, types: Any, bound: str, **settings: Any):
+        super().__init__(types, **settings)
+        self.bound = bound
+        self._around = frozen(self._around_pass)
+        self._items = frozen(self._item_pass)
+        self._item_blocks = frozen(self._item_block_pass)
+
+    def pairs(self, task: Task, setups: list[Any], levels: list[Any], tell: Any) -> Iterator[tuple[Pairs, list[Any]]]:
+        """Pairs of a block and an item, in chunks, and the items' rows."""
+        types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
+        faces = lanes(types, 0, dr.width(found_planes.first))
+        targets = room(types, 2, dr.width(faces))
+        cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, targets))
+        fan = int(dr.max(found_planes.count)[0])
+        for found, number in self.met(task, cones, levels, False, tell):
+            cull = "triangles" in self.culling
+            items = self._items(lanes(types, 0, number), found_planes, task.vertices, task.faces, found, cull)
+            many = items.found[0]
+            tell("bounds", items)
+            start, step = 0, max(1, LANES // fan)
+            while start < many:
+                step = min(step, many - start)
+                lane = lanes(types, start * fan, (start + step) * fan)
+                zeros = dr.zeros(types.UInt, task.blocks)
+                pairs = self._item_blocks(lane, fan, found_planes, items, bundle.corners, zeros)
+                if pairs.found[0] > ROOM and step > 1:
+                    step = max(1, step // (1 + pairs.found[0] // ROOM))
+                    continue
+                yield pairs, items.rows
+                start += step
+
+    def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, targets: list[Any]) -> list[Any]:
+        return stored(joined(self.types, cones, first, count), number, targets)
+
+    def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, before: Found, cull: bool) -> planes.Items:
+        return planes.items(self.types, self.bound, lane, found, vertices, faces, before, cull)
+
+    def _item_block_pass(self, lane: Any, fan: int, found: Any, items: Any, corners: Any, counts: Any) -> Pairs:
+        return planes.block_pairs(self.types, lane, fan, found, items, corners, counts)

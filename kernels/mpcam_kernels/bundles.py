@@ -21,7 +21,8 @@ class Bundle:
 
     pixels: rays, zero where a place has no pixel. blocks: rows of four numbers for each block of WIDTH x HEIGHT places:
     the cone (see `Cones`), then direction and moment as linear functions of the place in the block. groups: the cones
-    of groups of blocks. first, count: blocks of each group.
+    of groups of blocks. first, count: blocks of each group. corners: first column and row of each block within its
+    camera triangle. planes: what bounds images there (see `planes.Planes`), or None.
     """
 
     pixels: Rays
@@ -30,6 +31,8 @@ class Bundle:
     groups: "Cones"
     first: Any
     count: Any
+    corners: tuple[Any, Any]
+    planes: Any
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,20 @@ def gathered(pixels: Rays, types: Any, number: Any, active: Any = True) -> Rays:
     return Rays(*(dr.gather(types.Float, values, number, active) for values in pixels))
 
 
-def bounds(types: Any, pixels: Rays, block: Any) -> tuple[list[Any], list[Any]]:
-    """Rows of the cones and of the slopes of blocks by number.
+def room(types: Any, rows: int, count: int) -> list[Any]:
+    """Arrays for rows of four numbers. For frozen functions from outside: what they make themselves keeps its length."""
+    return [dr.empty(types.Float, 4 * count) for _ in range(rows)]
+
+
+def stored(rows: Any, number: Any, targets: list[Any]) -> list[Any]:
+    """The rows in these arrays."""
+    for target, row in zip(targets, rows, strict=True):
+        dr.scatter(target, row, number)
+    return targets
+
+
+def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
+    """Two rows of the cones and six of the slopes of blocks by number.
 
     Slopes: direction and moment are centre + s right + t down, s and t from -1 to 1 over the places of the block, and
     no more than a spread off. Rows: (d centre, d spread), (m centre, m spread), (d right, 0), (m right, 0), (d down,
@@ -94,7 +109,7 @@ def bounds(types: Any, pixels: Rays, block: Any) -> tuple[list[Any], list[Any]]:
         one = dr.select(valid, types.Float(1), 0)
         return k + 1, n + one, d + dk * one, m + mk * one, o + ok * one, s + sk * one, t + tk * one
 
-    empty = dr.zeros(types.Array3f, dr.width(block))
+    empty = types.Array3f(0)
     _, n, d, m, o, s, t = dr.while_loop((zero, nothing, empty, empty, empty, nothing, nothing), below, moments)
     inverse = 1.0 / dr.maximum(n, 1)
     d, m, o, s, t = d * inverse, m * inverse, o * inverse, s * inverse, t * inverse
@@ -131,7 +146,7 @@ def bounds(types: Any, pixels: Rays, block: Any) -> tuple[list[Any], list[Any]]:
     _, reach, spread, d_off, m_off = dr.while_loop((zero, none, none, none, none), below, widest)
     cones = [types.Array4f(*o, reach), types.Array4f(*axis, spread)]
     slopes = [(d_middle, d_off), (m_middle, m_off), (d_right, 0), (m_right, 0), (d_down, 0), (m_down, 0)]
-    return cones, [types.Array4f(*row, last) for row, last in slopes]
+    return [*cones, *(types.Array4f(*row, last) for row, last in slopes)]
 
 
 def position(types: Any, place: Any) -> tuple[Any, Any]:
@@ -143,7 +158,7 @@ def position(types: Any, place: Any) -> tuple[Any, Any]:
 
 def joined(types: Any, cones: Cones, first: Any, count: Any) -> list[Any]:
     """Rows of the cones around runs of cones."""
-    zero, nothing = types.UInt(0), dr.zeros(types.Array3f, dr.width(first))
+    zero, nothing = types.UInt(0), types.Array3f(0)
 
     def more(k: Any, *_: Any) -> Any:
         return k < count

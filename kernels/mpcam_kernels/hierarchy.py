@@ -66,32 +66,36 @@ def _kept(types: Any, a: Any, b: Any, keep: Any) -> Found:
     return Found(pairs, found)
 
 
-def first_pairs(types: Any, lane: Any, cones: Cones, balls: Any, clusters: int) -> Found:
-    """All pairs of a bundle and a cluster, a lane each."""
+def first_pairs(types: Any, lane: Any, cones: Cones, balls: Any, clusters: int, cull: bool) -> Found:
+    """All pairs of a bundle and a cluster, a lane each; with `cull`, those that may meet."""
     bundle, cluster = lane // clusters, lane % clusters
-    keep = may_meet(cones(types, bundle), dr.gather(types.Array4f, balls, cluster))
-    return _kept(types, bundle, cluster, keep)
+    return _kept(types, bundle, cluster, _meeting(types, cones, bundle, balls, cluster, True, cull))
 
 
-def refine_groups(types: Any, lane: Any, fan: int, bundle: Bundle, balls: Any, before: Found) -> Found:
+def _meeting(types: Any, cones: Cones, bundle: Any, balls: Any, ball: Any, exists: Any, cull: bool) -> Any:
+    """Whether bundles and balls may meet; without `cull`, whether there are both."""
+    if cull:
+        return exists & may_meet(cones(types, bundle, exists), dr.gather(types.Array4f, balls, ball, exists))
+    return exists & (dr.gather(types.Float, balls, ball * 4 + 3, exists) >= 0)
+
+
+def refine_groups(types: Any, lane: Any, fan: int, bundle: Bundle, balls: Any, before: Found, cull: bool) -> Found:
     """Pairs of a group and a cluster to pairs of a block and a cluster; fan: most blocks in a group."""
     group, cluster = dr.gather(types.Array2u, before.pairs, lane // fan)
     k = lane % fan
     exists = k < dr.gather(types.UInt, bundle.count, group)
     block = dr.gather(types.UInt, bundle.first, group) + k
-    ball = dr.gather(types.Array4f, balls, cluster, exists)
-    return _kept(types, block, cluster, exists & may_meet(bundle.cones(types, block, exists), ball))
+    return _kept(types, block, cluster, _meeting(types, bundle.cones, block, balls, cluster, exists, cull))
 
 
-def refine_clusters(types: Any, lane: Any, cones: Cones, balls: Any, count: int, before: Found, order: Any) -> Found:
+def refine_clusters(types: Any, lane: Any, cones: Cones, balls: Any, count: int, before: Found, order: Any, cull: bool) -> Found:
     """Pairs of a bundle and a cluster to pairs with its children, of which there are `count` in all."""
     bundle, cluster = dr.gather(types.Array2u, before.pairs, lane // FAN)
     child = cluster * FAN + lane % FAN
     exists = child < count
     if order is not None:
         child = dr.gather(types.UInt, order, child, exists)
-    ball = dr.gather(types.Array4f, balls, child, exists)
-    return _kept(types, bundle, child, exists & may_meet(cones(types, bundle), ball))
+    return _kept(types, bundle, child, _meeting(types, cones, bundle, balls, child, exists, cull))
 
 
 def block_pairs(

@@ -20,7 +20,7 @@ from mpcam_kernels.frozen import frozen
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.regions import Outline, region
-from mpcam_kernels.samples import COARSE, PIXELS, Samples
+from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of
 from mpcam_kernels.samples import blocks as blocks_of
 
 SMALL = 96  # pixels in a region that one lane walks by itself
@@ -204,9 +204,11 @@ class Pipeline:
     def _pixel_pass(
         self, lane: Any, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
     ) -> tuple[Any, Any]:
-        size = (self.width, self.height)
+        def corner(place: Any) -> tuple[Any, Any]:
+            return pixel_of(self.types, place, self.width, self.height)[:2]
+
         keys, *counted = pixels.through_lists(
-            self.types, self.test, self.output, lane, samples, large, lists, buffer, size, self.bounded, self.count
+            self.types, self.test, self.output, lane, samples, large, lists, buffer, corner, self.bounded, self.count
         )
         return keys, self._counted(counters, *counted)
 

@@ -2,13 +2,14 @@
 
 import functools
 import operator
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
 
 from mpcam_kernels import regions
 from mpcam_kernels.blocks import Large, Lists, set_up
-from mpcam_kernels.samples import PARTS, PIXELS, Samples, pixel_of
+from mpcam_kernels.samples import PARTS, PIXELS, Samples
 
 PER_LANE = 8  # pixels of a lane, two rows of a part: a set-up that is gathered serves eight tests in registers
 FOURS = PER_LANE // 4
@@ -23,7 +24,7 @@ def through_lists(
     large: Large,
     lists: Lists,
     buffer: Any,
-    size: tuple[int, int],
+    corner: Callable[[Any], tuple[Any, Any]],
     bounded: bool,
     count: bool,
 ) -> tuple[Any, Any, Any]:
@@ -31,7 +32,7 @@ def through_lists(
 
     lane: the numbers of the lanes, PER_LANE pixels each; from outside, since a frozen kernel that counts them itself
     takes its size from any array of a multiple of it, and replays the size that this array has then.
-    bounded: pixels outside of a triangle's region are not tested.
+    corner: from places to columns and rows, for regions. bounded: pixels outside of a triangle's region are not tested.
     """
     place = lane * PER_LANE
     block, part = place // PIXELS, (place >> 4) % PARTS
@@ -40,7 +41,7 @@ def through_lists(
     groups = [[dr.gather(types.Array4f, component, at) for component in samples.pixels] for at in fours]
     views = [type(samples.pixels)(*(component[k] for component in group)) for group in groups for k in range(4)]
     before = [key for at in fours for key in dr.gather(four, buffer, at)]
-    x, y, _ = pixel_of(types, place, *size)
+    x, y = corner(place) if bounded else (place, place)
     start = dr.gather(types.UInt, lists.starts, block)
     end = start + dr.gather(types.UInt, lists.counts, block)
 

@@ -58,26 +58,29 @@ class Region(NamedTuple):
         return span
 
 
-def region(types: Any, outline: Outline, width: int, height: int) -> tuple[Region, Any]:
-    """The pixels of an outline, widened by what rounding can amount to, and whether there are any."""
+def region(types: Any, outline: Outline, width: Any, height: Any) -> tuple[Region, Any]:
+    """The pixels of an outline, widened by what rounding can amount to, and whether there are any.
+
+    width, height: numbers, or one Float on the device for squares of several sizes.
+    """
     x0, x1 = _range(types, outline.low[0], outline.high[0], width)
     y0, y1 = _range(types, outline.low[1], outline.high[1], height)
-    pad = slack(max(width, height))
+    pad = slack(width if width is height else max(width, height))
     lines = tuple(types.Array3f(a, b, c + pad) for a, b, c in outline.lines)
     return Region(x0, y0, x1, y1, lines), outline.valid & (x0 < x1) & (y0 < y1)  # pyright: ignore[reportArgumentType]
 
 
-def slack(size: int) -> float:
+def slack(size: Any) -> Any:
     """What rounding of float32 can amount to in an image of so many pixels, in pixels."""
     return 2e-6 * size + 1e-3
 
 
-def _range(types: Any, low: Any, high: Any, size: int) -> tuple[Any, Any]:
+def _range(types: Any, low: Any, high: Any, size: Any) -> tuple[Any, Any]:
     """First and one past the last pixel whose centre lies in [low, high]."""
-    pad = slack(size)
+    pad, size = slack(size), float(size) if isinstance(size, int) else size
     first = dr.ceil(dr.maximum(low - (0.5 + pad), 0.0))
-    last = dr.floor(dr.minimum(high + (0.5 + pad), float(size)))
-    return types.Int(dr.minimum(first, float(size))), types.Int(dr.maximum(last, 0.0))
+    last = dr.floor(dr.minimum(high + (0.5 + pad), size))
+    return types.Int(dr.minimum(first, size)), types.Int(dr.maximum(last, 0.0))
 
 
 def pack(types: Any, area: Region, triangle: Any) -> list[Any]:

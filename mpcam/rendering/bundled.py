@@ -2,7 +2,8 @@
 
 import copy
 import functools
-from collections.abc import Callable
+from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,24 +22,40 @@ from mpcam.rendering.layout import Layout, layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
 
 
+BOUNDS = ("tight", "triangle", "nine_point")
+CULLING = ("objects", "triangles")
 FEW = 256  # balls that are held against every group of blocks: more of them get clusters
 
 
 class Bundled:
     """Frames of camera triangles over a mesh.
 
-    output: "hits", "depth" or "coverage".
+    bound: "tight" takes what the pixels' own rays exclude, block by block; "triangle" is the bounding triangle of Hou
+    et al. 2006 (section 2.1), "nine_point" the box of the same projected corners: every pixel inside is tested. output:
+    "hits", "depth" or "coverage". culling: what is left out early (section 2.4): "objects" by clusters of triangles,
+    "triangles" each by itself.
     """
 
     method = "invert"
 
     @exclusive
-    def __init__(self, camera: CameraTriangles, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"):
+    def __init__(
+        self,
+        camera: CameraTriangles,
+        mesh: Mesh,
+        bound: str = "tight",
+        output: str = "hits",
+        cull: str = "none",
+        culling: Sequence[str] = CULLING,
+    ):
         if cull != "none":
-            raise InputError(f"cull={cull!r}: camera triangles show both sides, use cull='none'")
-        if bound != "tight":
-            raise InputError(f"bound={bound!r} is not for camera triangles: use bound='tight'")
+            raise InputError(f"cull={cull!r}: camera triangles show both sides of faces, use cull='none'")
+        if bound not in BOUNDS:
+            raise InputError(f"bound={bound!r}: allowed for camera triangles are {', '.join(BOUNDS)}")
+        if isinstance(culling, str) or not set(culling) <= set(CULLING):
+            raise InputError(f"culling={culling!r}: give some or none of {', '.join(CULLING)}, as a tuple")
         self.mesh, self.output, self.bound = mesh, output, bound
+        self.culling = tuple(name for name in CULLING if name in culling)
         self.device = device_mesh(mesh)
         self.vertices, self.faces = self.device.vertices, self.device.faces
         self.tree = _tree(mesh)
@@ -49,7 +66,7 @@ class Bundled:
     def aim(self, camera: CameraTriangles) -> None:
         """Another camera, for frames in which the eye or the mirror moves."""
         self.camera = camera
-        self.rays = DeviceRays(camera, self.device)
+        self.rays = DeviceRays(camera, self.device, self.bound != "tight")
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
@@ -60,9 +77,12 @@ class Bundled:
         """Keys of all places, and counters or None; done(stage, arrays) is told of each stage."""
         from mpcam_kernels.backend import backend_name
 
-        kernels = _pipeline(self.output, count, backend_name())
-        rays = self.rays
-        return kernels.frame(self.vertices, self.faces, self.tree, rays.bundle, rays.layout.blocks, rays.fan, done)
+        from mpcam_kernels.bundle_pipeline import Task
+
+        rays, (order, counts) = self.rays, self.tree
+        kernels = _pipeline(self.bound, self.output, self.culling, rays.layout.blocks, count, backend_name())
+        task = Task(self.vertices, self.faces, order, counts, rays.bundle, rays.layout.blocks, rays.fan)
+        return kernels.frame(task, done)
 
     @exclusive
     def frame(self) -> Any:
@@ -115,7 +135,9 @@ class DeviceRays:
     bundle: rays by place, with bounds. place: Int, of each pixel row by row, -1 where a pixel has no ray.
     """
 
-    def __init__(self, camera: CameraTriangles, device: DeviceMesh):
+    def __init__(self, camera: CameraTriangles, device: DeviceMesh, planes: bool = False):
+        import drjit as dr
+
         t = types()
         self.layout: Layout = layout(camera.atlas)
         self.fan = int(self.layout.count.max())
@@ -135,6 +157,10 @@ class DeviceRays:
             if camera.index is not None:
                 bent["index"] = opaque_numbers([float(camera.index)])[0]
         self.bundle = _frozen_rays(camera.kind)(*fixed["lanes"], fixed, rows, bent)
+        if planes:
+            found = _planes(camera, device, pose, centre, fixed)
+            dr.make_opaque(found)
+            self.bundle = replace(self.bundle, planes=found)
 
     def in_rows(self) -> tuple[Any, Any, Any]:
         """Origin, direction and validity of every pixel's ray, row by row, in the mesh's frame."""
@@ -159,6 +185,9 @@ def _on_device(found: Layout, atlas: Any) -> dict[str, Any]:
     t = types()
     arrays = {"face": found.face, "x": found.x, "y": found.y, "first": found.first, "count": found.count}
     fixed: dict[str, Any] = {name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()}
+    counts = np.bincount(found.face, minlength=len(atlas.sides))
+    fixed["face_first"] = t.UInt((np.cumsum(counts) - counts).astype(np.uint32))
+    fixed["face_count"] = t.UInt(counts.astype(np.uint32))
     fixed["side"] = t.UInt(np.ascontiguousarray(atlas.sides[found.face], np.uint32))
     fixed["place"] = t.Int(found.places)
     fixed["lanes"] = [dr.arange(t.UInt, n) for n in (found.blocks * PIXELS, found.blocks, len(found.first))]
@@ -166,12 +195,40 @@ def _on_device(found: Layout, atlas: Any) -> dict[str, Any]:
     return fixed
 
 
+def _planes(camera: CameraTriangles, device: DeviceMesh, pose: np.ndarray, centre: np.ndarray, fixed: Any) -> Any:
+    """What bounds images on the camera triangles' planes, in the mesh's frame."""
+    from mpcam.cameras.generators import plane_bounds
+    from mpcam_kernels.planes import Planes
+
+    t, found = types(), plane_bounds(camera)
+    # Mesh's frame to camera frame, then to the plane; heights in the mesh's unit.
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = pose[:3, :3] * device.scale, -pose[:3, :3] @ centre
+    maps = found.maps @ frame
+    maps[:, 2] /= device.scale
+
+    def flat(values: np.ndarray) -> Any:
+        return t.Float(np.ascontiguousarray(values, np.float32).ravel())
+
+    slopes = [flat(found.slopes[:, k] * device.scale) for k in range(found.slopes.shape[1])]
+    sides = np.broadcast_to(np.asarray(camera.resolution), (camera.count,))
+    return Planes(
+        [flat(maps[:, row]) for row in range(3)],
+        slopes,
+        flat(found.state),
+        flat(found.lines),
+        t.UInt(np.ascontiguousarray(sides, np.uint32)),
+        fixed["face_first"],
+        fixed["face_count"],
+    )
+
+
 @functools.cache
 def _frozen_rays(kind: str) -> Any:
     """Kernels from tables of camera triangles to rays and their bounds. kind: see `CameraTriangles.kind`."""
     import drjit as dr
 
-    from mpcam_kernels.bundles import Bundle, Cones, bounds, joined
+    from mpcam_kernels.bundles import Bundle, Cones, bounds, joined, room, stored
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.samples import PIXELS
     from mpcam_kernels.skew import Rays
@@ -198,21 +255,21 @@ def _frozen_rays(kind: str) -> Any:
         return Rays(*direction, *cross(origin, direction), *origin)
 
     @frozen
-    def bound(block: Any, pixels: Rays) -> tuple[list[Any], list[Any]]:
-        cones, slopes = bounds(types(), pixels, block)
-        return [dr.ravel(row) for row in cones], [dr.ravel(row) for row in slopes]
+    def bound(block: Any, pixels: Rays, targets: list[Any]) -> list[Any]:
+        return stored(bounds(types(), pixels, block), block, targets)
 
     @frozen
-    def group(number: Any, cones: Any, first: Any, count: Any) -> list[Any]:
-        return [dr.ravel(row) for row in joined(types(), cones, first, count)]
+    def group(number: Any, cones: Any, first: Any, count: Any, targets: list[Any]) -> list[Any]:
+        return stored(joined(types(), cones, first, count), number, targets)
 
     def bundle(places: Any, block: Any, groups: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Bundle:
         used = {name: fixed[name] for name in ("face", "side", "x", "y")}
         pixels = rays(places, used, rows, bent)
-        cones, slopes = bound(block, pixels)
-        cones = Cones(cones)
-        around = group(groups, cones, fixed["first"], fixed["count"])
-        return Bundle(pixels, cones, slopes, Cones(around), fixed["first"], fixed["count"])
+        first, second, *slopes = bound(block, pixels, room(types(), 8, dr.width(block)))
+        cones = Cones([first, second])
+        around = group(groups, cones, fixed["first"], fixed["count"], room(types(), 2, dr.width(groups)))
+        corners = (fixed["x"], fixed["y"])
+        return Bundle(pixels, cones, slopes, Cones(around), fixed["first"], fixed["count"], corners, None)
 
     return bundle
 
@@ -226,9 +283,8 @@ def _bender(kind: str, bent: dict[str, Any]) -> CameraTriangles:
     return camera
 
 
-def _tree(mesh: Mesh) -> Any:
+def _tree(mesh: Mesh) -> tuple[Any, tuple[int, ...]]:
     """The triangles in an order that puts neighbours together, and the sizes of the levels of clusters above."""
-    from mpcam_kernels.bundle_pipeline import Tree
     from mpcam_kernels.hierarchy import FAN
 
     with np.errstate(invalid="ignore", over="ignore"):
@@ -236,14 +292,16 @@ def _tree(mesh: Mesh) -> Any:
     counts = [mesh.triangle_count]
     while counts[-1] > FEW and len(counts) < 5:
         counts.append(-(-counts[-1] // FAN))
-    return Tree(types().UInt(order.astype(np.uint32)), tuple(counts))
+    return types().UInt(order.astype(np.uint32)), tuple(counts)
 
 
-@functools.lru_cache(maxsize=8)
-def _pipeline(output: str, count: bool, backend: str) -> Any:
-    from mpcam_kernels.bundle_pipeline import BundlePipeline
+@functools.lru_cache(maxsize=32)
+def _pipeline(bound: str, output: str, culling: tuple[str, ...], blocks: int, count: bool, backend: str) -> Any:
+    """The frozen kernels for cameras of so many blocks: some arrays that they make have that length."""
+    from mpcam_kernels.bundle_pipeline import BundlePipeline, PlanePipeline
 
-    return BundlePipeline(types(), output=output, count=count)
+    settings: dict[str, Any] = {"output": output, "count": count, "culling": culling}
+    return BundlePipeline(types(), **settings) if bound == "tight" else PlanePipeline(types(), bound, **settings)
 
 
 @functools.cache

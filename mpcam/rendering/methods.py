@@ -49,7 +49,9 @@ def prepare(
         )
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
-    kinds = {"invert": ("bound", "cull"), "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
+    alike = camera.central or camera.parallel
+    invert = ("bound", "cull") if alike else ("bound", "cull", "culling")
+    kinds = {"invert": invert, "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
         raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
     allowed = kinds.get(method, ())
