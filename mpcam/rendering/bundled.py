@@ -10,6 +10,7 @@ import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.pose import frame_origin
+from mpcam.cameras.types import Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
@@ -17,7 +18,7 @@ from mpcam.math import cross, normalize
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.hits import Hits, Stats, View
 from mpcam.rendering.layout import Layout, layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
 
@@ -119,7 +120,7 @@ class Bundled:
             tests, rendered = self._count(vertices, rays)
             return Stats(int(tests), int(rendered))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, rays.view)
 
     @exclusive
     def _count(self, vertices: Any, rays: "DeviceRays") -> np.ndarray:
@@ -139,6 +140,7 @@ class DeviceRays:
         import drjit as dr
 
         t = types()
+        self.anchor, self.unit = device.anchor, opaque_numbers([device.scale])[0]
         self.layout: Layout = layout(camera.atlas)
         self.fan = int(self.layout.count.max())
         fixed = _on_device(self.layout, camera.atlas)
@@ -161,6 +163,18 @@ class DeviceRays:
             found = _planes(camera, device, pose, centre, fixed)
             dr.make_opaque(found)
             self.bundle = replace(self.bundle, planes=found)
+
+    @exclusive
+    def view(self) -> View:
+        """The rays in scene units, in world axes from the mesh's anchor."""
+        import drjit as dr
+
+        pose = np.eye(4)
+        pose[:3, 3] = -self.anchor
+        origin, direction, valid = self.in_rows()
+        ray = Ray(origin * self.unit, direction, valid)
+        dr.eval(ray)
+        return View(pose, ray)
 
     def in_rows(self) -> tuple[Any, Any, Any]:
         """Origin, direction and validity of every pixel's ray, row by row, in the mesh's frame."""

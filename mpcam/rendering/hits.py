@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.types import Ray
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.exclusive import exclusive
 
@@ -30,6 +31,14 @@ class Stats:
         return self.tests / self.rendered if self.rendered else float("inf")
 
 
+@dataclass(frozen=True)
+class View:
+    """The rays that hits were found with. ray: on the device, one per pixel, in a frame; pose: 4x4, frame from world."""
+
+    pose: np.ndarray
+    ray: Ray
+
+
 class Hits:
     """First hits of a camera's pixels on a mesh; every field is worked out when it is first asked for.
 
@@ -47,10 +56,19 @@ class Hits:
         depth: Any,
         weights: Callable[[], tuple[Any, Any]],
         stats: Callable[[], Stats],
+        view: Callable[[], View] | None = None,
     ):
         self.camera, self.mesh, self.method = camera, mesh, method
         self.device_triangle, self.device_depth = triangle, depth
-        self._weights, self._stats = weights, stats
+        self._weights, self._stats, self._view = weights, stats, view
+
+    @cached_property
+    @exclusive
+    def view(self) -> View:
+        """The rays; those of the camera unless something else found the hits."""
+        from mpcam.rendering.device import lens
+
+        return self._view() if self._view else View(np.asarray(self.camera.camera_from_world), lens(self.camera).ray)
 
     @cached_property
     @exclusive

@@ -11,7 +11,7 @@ from mpcam.cameras.pose import frame_origin
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
-from mpcam.rendering.device import lens, opaque_numbers, types
+from mpcam.rendering.device import opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits
 
@@ -158,8 +158,8 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
             data["texels"], data["textures"] = table.textures
             data["uv"] = table.uv
     if shading in ("normal", "light"):
-        ray = lens(hits.camera).ray
-        pose = opaque_numbers([*np.asarray(hits.camera.camera_from_world, np.float64)[:3, :3].ravel()])
+        ray = hits.view.ray
+        pose = opaque_numbers([*np.asarray(hits.view.pose, np.float64)[:3, :3].ravel()])
         data |= {"normals": table.normals, "pose": pose, "direction": ray.direction}
     kinds: tuple[str, ...] = ()
     if shading == "light":
@@ -170,7 +170,7 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
             data["origin"], data["depth"] = ray.origin, hits.device_depth  # pyright: ignore[reportPossiblyUnboundVariable]
         if shadows:
             data["face_normals"] = table.face_normals
-            data["shadows"] = [one.on_device(frame_origin(hits.camera.camera_from_world)) for one in shadows]
+            data["shadows"] = [one.on_device(frame_origin(hits.view.pose)) for one in shadows]
     kernel = _kernel(shading, kinds, table.smooth)
     return kernel(hits.device_triangle, weights, data)
 
@@ -180,7 +180,7 @@ def _light_numbers(light: Any, hits: Hits) -> list[Any]:
     if isinstance(light, DirectionalLight):
         return opaque_numbers([*(-np.asarray(light.direction)), *light.radiance])
     assert isinstance(light, PointLight)
-    matrix = np.asarray(hits.camera.camera_from_world)
+    matrix = np.asarray(hits.view.pose)
     return opaque_numbers([*(matrix[:3, :3] @ light.position + matrix[:3, 3]), *light.intensity])
 
 
