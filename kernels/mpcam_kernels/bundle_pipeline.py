@@ -1,8 +1,8 @@
 """Nearest triangle of every pixel for rays that need no common centre: candidates by a hierarchy, then exact per pixel.
 
 Balls around the triangles and clusters of them meet cones around groups and blocks of rays. What is left are pairs of a
-block and a triangle; where no edge excludes all rays of a part of the block, its pixels are tested. Nothing is kept from
-frame to frame but the order of the triangles, so scenes move freely.
+block and a triangle; where no edge excludes all rays of a part of the block, its pixels are tested. Nothing is kept
+from frame to frame but the order of the triangles, so scenes move freely.
 """
 
 from collections.abc import Callable, Iterator
@@ -113,7 +113,7 @@ class BundlePipeline:
         bundles = dr.width(cones.rows[0]) // 4
 
         def passed(fan: int, number: int, step: Callable[[Any], Found]) -> Iterator[tuple[Found, int]]:
-            """A step over all pairs, a lane for each of their `fan` children, in chunks whose results there is room for."""
+            """A step over all pairs, a lane for each of their `fan` children, in chunks that there is room for."""
             start, many = 0, max(1, LANES // fan)
             while start < number:
                 many = min(many, number - start)

@@ -37,8 +37,8 @@ class Bundle:
 
 @dataclass(frozen=True)
 class Cones:
-    """Bounds of bundles: origins no farther than `reach` from a centre, unit directions no farther than `spread` from an
-    axis. rows: (centre, reach), (axis, spread); reach is negative where there is no ray.
+    """Bounds of bundles: origins no farther than `reach` from a centre, unit directions no farther than `spread` from
+    an axis. rows: (centre, reach), (axis, spread); reach is negative where there is no ray.
     """
 
     rows: list[Any]
@@ -73,7 +73,7 @@ def gathered(pixels: Rays, types: Any, number: Any, active: Any = True) -> Rays:
 
 
 def room(types: Any, rows: int, count: int) -> list[Any]:
-    """Arrays for rows of four numbers. For frozen functions from outside: what they make themselves keeps its length."""
+    """Arrays for rows of four numbers; frozen functions need them from outside, where their length may change."""
     return [dr.empty(types.Float, 4 * count) for _ in range(rows)]
 
 
@@ -153,7 +153,9 @@ def position(types: Any, place: Any) -> tuple[Any, Any]:
     """Where a place lies in its block, from -1 to 1 along both sides."""
     x = ((place >> 4) & 3) * 4 + (place & 3)
     y = ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
-    return (types.Float(x) - 0.5 * (WIDTH - 1)) * (2.0 / (WIDTH - 1)), (types.Float(y) - 0.5 * (HEIGHT - 1)) * (2.0 / (HEIGHT - 1))
+    return (types.Float(x) - 0.5 * (WIDTH - 1)) * (2.0 / (WIDTH - 1)), (types.Float(y) - 0.5 * (HEIGHT - 1)) * (
+        2.0 / (HEIGHT - 1)
+    )
 
 
 def joined(types: Any, cones: Cones, first: Any, count: Any) -> list[Any]:

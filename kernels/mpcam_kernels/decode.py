@@ -22,9 +22,7 @@ def in_rows(kind: Any, values: Any, pixel: Any, width: int) -> Any:
     return dr.gather(kind, values, places(pixel, width))
 
 
-def weights(
-    types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any, row: Any
-) -> tuple[Any, Any]:
+def weights(types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any, row: Any) -> tuple[Any, Any]:
     """Barycentric weights of corners 2 and 3 where `samples` hit their triangles; 0 where triangle is -1.
 
     vertices: a row (an array type) each, which starts with the position.

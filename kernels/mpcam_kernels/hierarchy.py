@@ -30,7 +30,9 @@ def triangle_balls(types: Any, points: tuple[Any, Any, Any], usable: Any) -> Any
     a, b, c = points
     low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
     centre = 0.5 * (low + high)
-    radius = dr.sqrt(dr.maximum(dr.maximum(dr.squared_norm(a - centre), dr.squared_norm(b - centre)), dr.squared_norm(c - centre)))
+    radius = dr.sqrt(
+        dr.maximum(dr.maximum(dr.squared_norm(a - centre), dr.squared_norm(b - centre)), dr.squared_norm(c - centre))
+    )
     return types.Array4f(*dr.select(usable, centre, 0), dr.select(usable, radius, -1.0))
 
 
@@ -88,7 +90,9 @@ def refine_groups(types: Any, lane: Any, fan: int, bundle: Bundle, balls: Any, b
     return _kept(types, block, cluster, _meeting(types, bundle.cones, block, balls, cluster, exists, cull))
 
 
-def refine_clusters(types: Any, lane: Any, cones: Cones, balls: Any, count: int, before: Found, order: Any, cull: bool) -> Found:
+def refine_clusters(
+    types: Any, lane: Any, cones: Cones, balls: Any, count: int, before: Found, order: Any, cull: bool
+) -> Found:
     """Pairs of a bundle and a cluster to pairs with its children, of which there are `count` in all."""
     bundle, cluster = dr.gather(types.Array2u, before.pairs, lane // FAN)
     child = cluster * FAN + lane % FAN
@@ -113,7 +117,8 @@ def block_pairs(
     room = [dr.empty(types.UInt, ROOM) for _ in range(4)]
     for target, value in zip(room, (triangle, block, bits, rank), strict=True):
         dr.scatter(target, value, slot, keep)
-    return blocks.Pairs(*room, found, counts)
+    names, numbers, parts, ranks = room
+    return blocks.Pairs(names, numbers, parts, ranks, found, counts)
 
 
 def parts_hit(types: Any, shape: Any, cone: tuple[Any, Any], slopes: list[Any]) -> Any:

@@ -105,7 +105,9 @@ def items(
     return Items(room, owners, found)
 
 
-def block_pairs(types: Any, lane: Any, fan: int, planes: Planes, items: Items, corner: tuple[Any, Any], counts: Any) -> blocks.Pairs:
+def block_pairs(
+    types: Any, lane: Any, fan: int, planes: Planes, items: Items, corner: tuple[Any, Any], counts: Any
+) -> blocks.Pairs:
     """Items and the blocks that they reach, with the parts. fan: most blocks of a camera triangle; corner: first column
     and row of each block."""
     item, k = lane // fan, lane % fan
@@ -120,7 +122,9 @@ def block_pairs(types: Any, lane: Any, fan: int, planes: Planes, items: Items, c
         left, top = x + (part % 4) * PART, y + (part // 4) * PART
         first, end = dr.maximum(top, area.y0), dr.minimum(top + PART, area.y1) - 1
         start, stop = spans(first, end)
-        reached = exists & (first <= end) & (start < left + PART) & (stop > left) & (start < stop) & (left + top <= last)
+        reached = (
+            exists & (first <= end) & (start < left + PART) & (stop > left) & (start < stop) & (left + top <= last)
+        )
         bits |= dr.select(reached, types.UInt(1 << part), 0)
     found = dr.zeros(types.UInt, 1)
     dr.make_opaque(counts, found)
@@ -129,6 +133,5 @@ def block_pairs(types: Any, lane: Any, fan: int, planes: Planes, items: Items, c
     room = [dr.empty(types.UInt, ROOM) for _ in range(4)]
     for target, value in zip(room, (item, block, bits, rank), strict=True):
         dr.scatter(target, value, slot, (bits != 0) & (slot < ROOM))
-    return blocks.Pairs(*room, found, counts)
-
-
+    names, numbers, parts, ranks = room
+    return blocks.Pairs(names, numbers, parts, ranks, found, counts)

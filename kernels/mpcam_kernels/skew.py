@@ -53,12 +53,18 @@ def setup(a: Vector, b: Vector, c: Vector) -> SkewTriangle:
     """Edges and plane of triangles with corners a, b, c; unusable where they have no area."""
     normal = dr.cross(b - a, c - a)
     squared = dr.squared_norm(normal)
-    return SkewTriangle((_edge(b, c), _edge(c, a), _edge(a, b)), normal, dr.dot(normal, a), (squared > 0) & dr.isfinite(squared))
+    return SkewTriangle(
+        (_edge(b, c), _edge(c, a), _edge(a, b)), normal, dr.dot(normal, a), (squared > 0) & dr.isfinite(squared)
+    )
 
 
 def _sides(triangle: SkewTriangle, ray: Any) -> list[Float]:
     return [
-        dr.fma(ray.dx, n.x, dr.fma(ray.dy, n.y, dr.fma(ray.dz, n.z, dr.fma(ray.mx, e.x, dr.fma(ray.my, e.y, ray.mz * e.z)))))
+        dr.fma(
+            ray.dx,
+            n.x,
+            dr.fma(ray.dy, n.y, dr.fma(ray.dz, n.z, dr.fma(ray.mx, e.x, dr.fma(ray.my, e.y, ray.mz * e.z)))),
+        )
         for n, e in triangle.edges
     ]
 
@@ -102,5 +108,9 @@ def pack(types: Any, triangle: SkewTriangle) -> list[Any]:
 def unpack(rows: list[Any]) -> SkewTriangle:
     """The set-up of a usable triangle from its rows."""
     kind = type(rows[0].xyz)
-    edges = ((rows[0].xyz, rows[1].xyz), (rows[2].xyz, rows[3].xyz), (rows[4].xyz, kind(rows[1].w, rows[2].w, rows[3].w)))
+    edges = (
+        (rows[0].xyz, rows[1].xyz),
+        (rows[2].xyz, rows[3].xyz),
+        (rows[4].xyz, kind(rows[1].w, rows[2].w, rows[3].w)),
+    )
     return SkewTriangle(edges, rows[5].xyz, rows[0].w, True)

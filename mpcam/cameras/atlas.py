@@ -2,7 +2,6 @@
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class Atlas:
 
     @functools.cached_property
     def places(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Camera triangle, column and row (from corner 1, along its short sides) of every pixel, row by row; -1: none."""
+        """Camera triangle, column and row (from corner 1) of every pixel, row by row; -1: none."""
         y, x = np.divmod(np.arange(self.width * self.height), self.width)
         face, second, third, inside = self.locate(x + 0.5, y + 0.5)
         last = self.sides[face] - 1

@@ -1,20 +1,24 @@
 """Images of points where a camera triangle bends the rays of an eye: interpolated normals, reflection or refraction.
 
-The pixel's ray is a polynomial of higher degree there (a cubic direction for mirrors), so the triangle is cut into parts
-whose rays are nearly linear. Each part's cubic gives starts, and Newton's method the images of the true rays.
+The pixel's ray is no linear function there (a cubic direction for mirrors), so the triangle is cut into parts whose
+rays are nearly linear. Each part's cubic gives starts, and Newton's method the images of the true rays.
 """
 
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from mpcam.cameras import three_rays
-from mpcam.math import Array, Vector, cross, detach, dot, epsilon, norm, normalize, vector, where
+from mpcam.math import Array, Vector, cross, detach, dot, epsilon, library, norm, normalize, vector, where
 
 PARTS = 4  # along each side of a camera triangle
 IMAGES = 4
-MARGIN = 0.5
-"""How far out of its part a start may lie, as a weight: the linear rays of a part miss the true ones by a little."""
-_STEPS = 6
+WIDER = 2.0
+"""Starts are looked for in a larger triangle around each part, whose linear rays miss the true ones a little."""
+LOOSE = 3.0
+"""Points are tried in a part if they lie within its cone of rays, widened so many times."""
+_STEPS = 12
 
 Bend = Callable[[Vector, Vector], tuple[Vector, Array]]
 Image = tuple[Array, Array, Array, Array]
@@ -23,73 +27,120 @@ Image = tuple[Array, Array, Array, Array]
 def project(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector) -> list[Image]:
     """Images of points q in camera triangles with corners v and normals n: weights 2 and 3, distance, validity.
 
-    All three components first, broadcast against each other. bend: origin and normal to direction and validity. At most
-    IMAGES of them are found, in no order.
+    All components first, broadcast against each other. bend: origin and normal to direction and validity. At most
+    IMAGES of them are found, in no order; two that nearly coincide (at a fold) may count as one.
     """
-
-    def ray(second: Array, third: Array) -> tuple[Vector, Vector, Array]:
-        origin, normal = (
-            vector(*(c[0][k] + second * (c[1][k] - c[0][k]) + third * (c[2][k] - c[0][k]) for k in range(3)))
-            for c in (v, n)
-        )
-        direction, valid = bend(origin, normal)
-        return origin, normalize(direction), valid
-
-    blank = 0.0 * (q[0] + v[0][0])
-    found = [(blank, blank, blank, blank > 1.0) for _ in range(IMAGES)]
-    for part, corners in enumerate(_parts()):
-        rays = [ray(blank + second, blank + third) for second, third in corners]
-        starts = three_rays.project(tuple(r[0] for r in rays), tuple(r[1] for r in rays), q, margin=MARGIN)
-        known: list[tuple[Array, Array, Array]] = []
-        for start in starts:
-            weights = (start.w1, start.w2, 1.0 - start.w1 - start.w2)
-            second, third = (detach(sum(w * c[i] for w, c in zip(weights, corners, strict=True))) for i in range(2))
-            second, third, distance, good = _refined(ray, q, second, third, detach(start.c))
-            good = good & start.valid & (_part_of(second, third) == part)
-            for other_second, other_third, other_good in known:
-                near = 1e3 * epsilon(second) ** 0.75
-                same = (abs(other_second - second) < near) & (abs(other_third - third) < near)
-                good = good & ~(other_good & same)
-            known.append((second, third, good))
-            found = _kept(found, (second, third, distance, good))
+    if library(*q, *v[0]) == "numpy":
+        return _compressed(bend, v, n, q)
+    found = _nothing(0.0 * (q[0] + v[0][0]))
+    for corners in _parts():
+        found = _merged(found, _in_part(bend, corners, v, n, q))
     return found
 
 
-def _refined(ray: Any, q: Vector, second: Array, third: Array, distance: Array) -> tuple[Array, Array, Array, Array]:
-    """Newton's method on origin + distance direction = q; weights, distance, and whether it came to rest inside.
+def _compressed(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector) -> list[Image]:
+    """The same for NumPy, with only those points in each part that may have an image there."""
+    shape = np.broadcast_shapes(*(np.shape(part) for one in (*v, *n, q) for part in one))
+
+    def flat(one: Vector) -> np.ndarray:
+        return np.stack([np.broadcast_to(part, shape).ravel() for part in one])
+
+    v, n, q = tuple(map(flat, v)), tuple(map(flat, n)), flat(q)
+    found = [tuple(part.copy() for part in image) for image in _nothing(np.zeros(q.shape[1]))]
+    for corners in _parts():
+        chosen = np.flatnonzero(_may_pass(_rays(bend, corners, v, n, 0.0 * q[0]), q))
+        if len(chosen) == 0:
+            continue
+        places, normals = (tuple(x[:, chosen] for x in one) for one in (v, n))
+        before = [tuple(part[chosen] for part in image) for image in found]
+        after = _merged(before, _in_part(bend, corners, places, normals, q[:, chosen]))
+        for image, values in zip(found, after, strict=True):
+            for part, value in zip(image, values, strict=True):
+                part[chosen] = value
+    return [tuple(part.reshape(shape) for part in image) for image in found]  # pyright: ignore[reportReturnType]
+
+
+def _may_pass(rays: list[tuple[Vector, Vector, Array]], q: Vector) -> Array:
+    """Whether points lie within the cone around three rays, widened."""
+    centre = sum(ray[0] for ray in rays) / 3.0
+    axis = normalize(sum(ray[1] for ray in rays))
+    reach, spread = (np.max([norm(ray[k] - one) for ray in rays], axis=0) for k, one in ((0, centre), (1, axis)))
+    reach, spread = LOOSE * reach, np.minimum(LOOSE * spread + 0.01, 2.0)
+    away = q - centre
+    a, b, c = 1.0 - spread**2, dot(away, axis) + reach * spread, dot(away, away) - reach**2
+    bent = rays[0][2] & rays[1][2] & rays[2][2]  # where some rays do not pass, the cone means little
+    return (c <= 0) | (a <= 0) | ((b > 0) & (b * b >= a * c)) | ~bent
+
+
+def _rays(bend: Bend, places: Any, v: Any, n: Any, blank: Array) -> list[tuple[Vector, Vector, Array]]:
+    return [_ray(bend, v, n, blank + second, blank + third) for second, third in places]
+
+
+def _ray(bend: Bend, v: Any, n: Any, second: Array, third: Array) -> tuple[Vector, Vector, Array]:
+    """Origin, unit direction and validity at weights of corners 2 and 3."""
+    origin, normal = (
+        vector(*(c[0][k] + second * (c[1][k] - c[0][k]) + third * (c[2][k] - c[0][k]) for k in range(3)))
+        for c in (v, n)
+    )
+    direction, valid = bend(origin, normal)
+    return origin, normalize(direction), valid
+
+
+def _in_part(bend: Bend, corners: Any, v: Any, n: Any, q: Vector) -> list[Image]:
+    """Images that are found from the linear rays between three places of a camera triangle."""
+    rays = _rays(bend, corners, v, n, 0.0 * (q[0] + v[0][0]))
+    starts = three_rays.project(*(_widened([one[k] for one in rays]) for k in range(2)), q)
+    places = _widened([np.array(corner) for corner in corners])
+    found = []
+    for start in starts:
+        weights = (start.w1, start.w2, 1.0 - start.w1 - start.w2)
+        second, third = (detach(sum(w * float(p[i]) for w, p in zip(weights, places, strict=True))) for i in range(2))
+        *image, good = _refined(bend, v, n, q, second, third, detach(start.c))
+        found.append((*image, good & start.valid))
+    return found
+
+
+def _refined(bend: Bend, v: Any, n: Any, q: Vector, second: Array, third: Array, distance: Array) -> Image:
+    """Newton's method on origin + distance direction = q; weights, distance, and whether they are an image.
 
     The derivative is that of the last step, which is the implicit-function theorem's.
     """
     small = epsilon(second)
-    change, scale, valid = second, second, second > 0
+    scale, valid, miss = second, second > 0, q
     for step in range(_STEPS):
         last = step == _STEPS - 1
         if last:
             second, third, distance = detach(second), detach(third), detach(distance)
-        origin, direction, valid = ray(second, third)
+        origin, direction, valid = _ray(bend, v, n, second, third)
         miss = vector(*(origin[k] + distance * direction[k] - q[k] for k in range(3)))
         h = 0.3 * small**0.5
         columns = []
-        for sideways in (ray(second + h, third), ray(second, third + h)):
-            columns.append(
-                vector(*(detach((sideways[0][k] - origin[k] + distance * (sideways[1][k] - direction[k])) / h) for k in range(3)))
-            )
+        for aside in (_ray(bend, v, n, second + h, third), _ray(bend, v, n, second, third + h)):
+            moved = [aside[0][k] - origin[k] + distance * (aside[1][k] - direction[k]) for k in range(3)]
+            columns.append(vector(*(detach(part / h) for part in moved)))
         a, b, c = *columns, detach(direction)
         across = cross(b, c)
         volume = dot(a, across)
-        usable = abs(volume) > 1e-12 * norm(a) * norm(b)
+        usable = abs(volume) > 0.1 * small * norm(a) * norm(b)
         inverse = where(usable, 1.0 / where(usable, volume, 1.0), 0.0)
-        steps = (dot(miss, across) * inverse, dot(miss, cross(c, a)) * inverse, dot(miss, cross(a, b)) * inverse)
-        # Not out of sight in one step: the linear part's start is near.
-        damp = 1.0 if last else where(abs(steps[0]) + abs(steps[1]) > 0.5, 0.5 / (abs(steps[0]) + abs(steps[1]) + 1e-30), 1.0)
-        second, third, distance = second - damp * steps[0], third - damp * steps[1], distance - damp * steps[2]
-        change = abs(steps[0]) + abs(steps[1])
+        steps = dot(miss, across) * inverse, dot(miss, cross(c, a)) * inverse, dot(miss, cross(a, b)) * inverse
+        if not last:  # not out of sight in one step: the linear part's start is near
+            size = abs(steps[0]) + abs(steps[1])
+            damp = where(size > 0.3, 0.3 / (size + 1e-30), 1.0)
+            steps = tuple(damp * part for part in steps)
+        second, third, distance = second - steps[0], third - steps[1], distance - steps[2]
         scale = abs(distance) + norm(vector(*(origin[k] - q[k] for k in range(3))))
-        valid = valid & usable
-    rest = (change < 30.0 * small**0.75) & (norm(miss) <= 100.0 * small**0.75 * (scale + norm(a) + norm(b)))  # pyright: ignore[reportPossiblyUnboundVariable]
-    edge = -three_rays.INSIDE * (1.0 if small < 1e-10 else 1.0)
+    edge = -30.0 * small**0.75
     inside = (second >= edge) & (third >= edge) & (1.0 - second - third >= edge)
-    return second, third, distance, valid & rest & inside & (distance >= 0)
+    good = valid & inside & (distance >= 0) & (norm(miss) <= 30.0 * small**0.75 * scale)
+    return second, third, distance, good
+
+
+def _widened(corners: list[Vector]) -> tuple[Vector, ...]:
+    """The corners of the larger triangle, by going on linearly."""
+    a, b, c = corners
+    centre = (a + b + c) * (1.0 / 3.0)
+    return tuple(centre + WIDER * (corner - centre) for corner in (a, b, c))
 
 
 def _parts() -> list[tuple[tuple[float, float], ...]]:
@@ -104,28 +155,21 @@ def _parts() -> list[tuple[tuple[float, float], ...]]:
     return [tuple((x * step, y * step) for x, y in part) for part in parts]
 
 
-def _part_of(second: Array, third: Array) -> Array:
-    """Number of the part that weights lie in, as a float; those a little outside belong to the nearest."""
-    x, y = _clipped(second * PARTS), _clipped(third * PARTS)
-    column, row = sum(where(x >= k, 1.0, 0.0 * x) for k in range(1, PARTS)), sum(where(y >= k, 1.0, 0.0 * y) for k in range(1, PARTS))
-    beyond = column + row > PARTS - 1
-    column = where(beyond & (x - column <= y - row), column - 1.0, column)
-    row = where(beyond & (column + row > PARTS - 1), row - 1.0, row)
-    lower = (column + row < PARTS - 1) & (x - column + (y - row) > 1.0)
-    # Rows before hold 2 (PARTS - r) - 1 parts each.
-    return row * (2.0 * PARTS - row) + 2.0 * column + where(lower, 1.0, 0.0 * x)
+def _nothing(blank: Array) -> list[Image]:
+    return [(blank, blank, blank, blank > 1.0) for _ in range(IMAGES)]
 
 
-def _clipped(x: Array) -> Array:
-    return where(x > 0, where(x < PARTS, x, 0.0 * x + PARTS), 0.0 * x)
-
-
-def _kept(found: list[Image], image: Image) -> list[Image]:
-    """The list with one more image in its first free place."""
-    *values, left = image
-    result = []
-    for slot in found:
-        put = left & ~slot[3]
-        result.append((*(where(put, new, old) for new, old in zip(values, slot, strict=False)), slot[3] | put))
-        left = left & ~put
-    return result
+def _merged(found: list[Image], images: list[Image]) -> list[Image]:
+    """The list with those of more images that it does not hold yet, each in the first free place."""
+    for *values, left in images:
+        near = 10.0 * epsilon(values[0]) ** 0.5
+        for second, third, _, there in found:
+            same = (abs(second - values[0]) < near) & (abs(third - values[1]) < near)
+            left = left & ~(there & same)
+        after = []
+        for slot in found:
+            put = left & ~slot[3]
+            after.append((*(where(put, new, old) for new, old in zip(values, slot, strict=False)), slot[3] | put))
+            left = left & ~put
+        found = after
+    return found

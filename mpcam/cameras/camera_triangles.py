@@ -10,8 +10,8 @@ from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.pose import as_pose
 from mpcam.cameras.types import Domain, Projection, Ray
 from mpcam.errors import InputError
-from mpcam.geometry.optics import reflect, refract
 from mpcam.math import Array, Vector, cross, dot, isfinite, library, normalize, plain, take, vector, where
+from mpcam.math.optics import reflect, refract
 
 SCALES = ("unit", "plane", "near_far")
 
@@ -166,7 +166,7 @@ class CameraTriangles(Camera):
         return direction, passes & (dot(along, along) > 0) & (dot(incident, incident) > 0)
 
     def local_ray(self, pixel: Vector) -> Ray:
-        """Ray of a pixel in the camera frame; valid on the camera triangles, and where light is not totally reflected."""
+        """Ray of a pixel in the camera frame; valid on camera triangles, where light is not totally reflected."""
         face, second, third, inside = self.atlas.locate(*pixel)
         origin, direction, valid = self.ray_at(face, second, third)
         valid = valid & inside & isfinite(direction[0] + direction[1] + direction[2])
@@ -178,8 +178,8 @@ class CameraTriangles(Camera):
         """All images of points in all camera triangles; those of camera triangle f are numbers k f to k f + k - 1.
 
         points (..., 3): world frame. Returns Projection with pixel (..., n, 2), depth (..., n), valid (..., n) for
-        n = images_per_point and k = images_per_triangle. A point on a triangle has an image there at depth 0. Dr.Jit: an
-        Array3f in, tuples of n entries out. Raises InputError when the last axis is not 3.
+        n = images_per_point and k = images_per_triangle. A point on a triangle has an image there at depth 0. Dr.Jit:
+        an Array3f in, tuples of n entries out. Raises InputError when the last axis is not 3.
         """
         from mpcam.cameras.images import images_of
 
@@ -224,7 +224,7 @@ def _table(values: Any, name: str, zero: bool = True) -> Any:
     return table
 
 
-def _first(mask: np.ndarray) -> int:
+def _first(mask: Any) -> int:
     return int(np.flatnonzero(mask)[0])
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-
 LEAST = 1e-3
 """Generators that leave at a smaller sine to the camera plane bound nothing."""
 
@@ -22,7 +21,8 @@ class PlaneBounds:
 
     maps (F, 3, 4): a point (x, y, z, 1) of the camera frame to u, v and the height above the plane. slopes (F, K, 2):
     what to subtract from (u, v) per height, for each generator. state (F,): 1 or -1, the side of the plane that rays
-    leave on, 0 where generators bound nothing. lines (F, 3, 2): outward normals of the sides of the paper's bounding triangle, unit length; they span the plane.
+    leave on, 0 where generators bound nothing. lines (F, 3, 2): outward normals of the sides of the paper's bounding
+    triangle, unit length; they span the plane.
     """
 
     maps: np.ndarray
@@ -40,7 +40,9 @@ def plane_bounds(camera: Any) -> PlaneBounds:
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     flat = length[:, 0] <= 1e-12 * np.maximum(np.abs(b - a).max(1), np.abs(c - a).max(1)) ** 2
     normal = normal / np.where(length > 0, length, 1.0)
-    frame = np.stack([right, down, np.where(flat[:, None], 1.0, normal)], -1)  # columns: one pixel each, one unit of height
+    frame = np.stack(
+        [right, down, np.where(flat[:, None], 1.0, normal)], -1
+    )  # columns: one pixel each, one unit of height
     frame[flat] = np.eye(3)
     inverse = np.linalg.inv(frame)
     maps = np.concatenate([inverse, -(inverse @ a[:, :, None])], -1)
@@ -87,7 +89,10 @@ def _refraction_range(incident: list[np.ndarray], normals: list[np.ndarray], ind
 
     def quadratic(x: list[np.ndarray], y: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         values = np.stack(
-            [0.5 * (_dot(x[i], y[j]) + _dot(x[j], y[i]))[:, 0] for i, j in itertools.combinations_with_replacement(range(3), 2)]
+            [
+                0.5 * (_dot(x[i], y[j]) + _dot(x[j], y[i]))[:, 0]
+                for i, j in itertools.combinations_with_replacement(range(3), 2)
+            ]
         )
         return values.min(0), values.max(0)
 
@@ -112,7 +117,8 @@ def _refraction_range(incident: list[np.ndarray], normals: list[np.ndarray], ind
 
 
 def _lines(camera: Any, right: np.ndarray, down: np.ndarray, normal: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """Outward normals of the paper's bounding triangle: along the rays' parts in the plane, with the sign that closes it.
+    """Outward normals of the paper's bounding triangle: along the rays' parts in the plane, with the sign that closes
+    it.
 
     The paper leaves the signs out: the half-planes bound a triangle only if some positive combination of the outward
     normals vanishes. Where two rays' parts are nearly parallel, the sides of the camera triangle take their place.
@@ -126,7 +132,9 @@ def _lines(camera: Any, right: np.ndarray, down: np.ndarray, normal: np.ndarray,
         # The same line in pixels: its normal's inner products with the pixel's two sides.
         line = np.stack([_dot(inside, right)[:, 0], _dot(inside, down)[:, 0]], -1)
         parts.append(line / np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-300))
-    turns = np.stack([_turn(parts[(i + 1) % 3], parts[(i + 2) % 3]) for i in range(3)], 1)  # sum of turns[i] parts[i] is 0
+    turns = np.stack(
+        [_turn(parts[(i + 1) % 3], parts[(i + 2) % 3]) for i in range(3)], 1
+    )  # sum of turns[i] parts[i] is 0
     sides = np.array([[1.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]) / np.array([[np.sqrt(2.0)], [1.0], [1.0]])
     poor = (np.abs(turns).min(1) < 0.05) | flat
     signed = np.stack(parts, 1) * np.sign(turns)[..., None]

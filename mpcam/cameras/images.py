@@ -75,7 +75,9 @@ def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, 
         for image in images:
             w3 = 1.0 - image.w1 - image.w2
             weights = (image.w1, image.w2, w3)
-            lengths.append(norm(vector(*(sum(w * ray[k] for w, ray in zip(weights, rays, strict=True)) for k in range(3)))))
+            lengths.append(
+                norm(vector(*(sum(w * ray[k] for w, ray in zip(weights, rays, strict=True)) for k in range(3))))
+            )
         found = [(i.w2, 1.0 - i.w1 - i.w2, i.c * length, i.valid) for i, length in zip(images, lengths, strict=True)]
     else:
         found = bent_rays.project(camera.bend, places, rays, point)

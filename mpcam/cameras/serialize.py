@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera, given_fields
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.double_sphere import DoubleSphere
 from mpcam.cameras.kannala_brandt import KannalaBrandt
 from mpcam.cameras.orthographic import Orthographic
@@ -18,7 +19,8 @@ from mpcam.errors import InputError
 SCHEMA = 1
 
 MODELS: dict[str, type[Camera]] = {
-    model.__name__: model for model in (Pinhole, Orthographic, Radial, KannalaBrandt, DoubleSphere, UnifiedOmni)
+    model.__name__: model
+    for model in (Pinhole, Orthographic, Radial, KannalaBrandt, DoubleSphere, UnifiedOmni, CameraTriangles)
 }
 
 
@@ -38,7 +40,8 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
                 )
             value = value.name
         elif hasattr(value, "shape"):
-            value = np.asarray(value, np.float64).tolist()
+            table = np.asarray(value)
+            value = (table if table.dtype.kind in "iu" else table.astype(np.float64)).tolist()
         elif isinstance(value, tuple):
             value = [float(number) for number in value]
         result[name] = value

@@ -8,8 +8,11 @@ three images at most.
 
 from typing import Any, NamedTuple
 
-from mpcam.math import Array, absolute, detach, epsilon, library, maximum, minimum, where
-from mpcam.math.cubic import Root, cubic_roots
+import numpy as np
+
+from mpcam.math import Array, absolute, detach, epsilon, library, maximum, minimum, vector, where
+from mpcam.math.cubic import Root, cubic_roots, determinant_cubic
+from mpcam.math.roots import repeat
 
 SLACK = 4.0
 """Rounding that is forgiven at the edges of the triangle and at c = 0, in units of eps times the condition number."""
@@ -23,8 +26,8 @@ RESIDUAL = 32.0
 COLLAPSED = 16.0
 """Swept triangles whose sine is below this many eps have collapsed; so have ray directions shorter than that."""
 
-FOLD = 16.0
-"""Where the scaled determinant of the derivatives is below this many eps, an image has no derivative."""
+FOLD = 2.0**-6
+"""Where the determinant of the derivatives, columns scaled to 1, is below this many eps, an image has no derivative."""
 
 POLISH = 2
 """Newton's steps on all three unknowns, after the cubic."""
@@ -57,6 +60,8 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     """
     (v1, v2, v3), (d1, d2, d3) = v, d
     given = [_triple(x) for x in (v1, v2, v3, d1, d2, d3, q)]
+    if all(type(x) in (int, float) for row in given for x in row):
+        given[0] = _triple(np.float64(x) for x in given[0])  # so that comparisons can be negated by ~
     largest = _largest(*given)
     limit = 1e15 if epsilon(largest) > 1e-10 else 1e100  # ratios of three such numbers do not overflow
     fine = largest < limit
@@ -64,14 +69,26 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     corners, rays, point = given[:3], given[3:6], given[6]
     fixed = [tuple(detach(x) for x in row) for row in given]
     frame = _Scaled(fixed[:3], fixed[3:6], fixed[6])
-    roots = cubic_roots(*frame.cubic(), -LARGEST_SLACK, 1.0 / frame.eps)
+    roots = cubic_roots(*determinant_cubic(frame.a, frame.d), -LARGEST_SLACK, 1.0 / frame.eps)
     some = fine & (frame.longest > 0) & (frame.farthest > 0)
 
-    def image(i: int) -> Image:
-        others = [roots[j] for j in range(3) if j != i]
-        return _differentiable(corners, rays, point, frame, frame.image(roots[i].root, some & roots[i].exists, others))
+    def images(x: Array, exists: Array, others: list[Root]) -> Image:
+        return _differentiable(corners, rays, point, frame, frame.image(x, some & exists, others))
 
-    return image(0), image(1), image(2)
+    def stacked(order: tuple[int, int, int]) -> Root:
+        return Root(vector(*[roots[i].root for i in order]), vector(*[roots[i].exists for i in order]))
+
+    first, second, third = roots
+    if library(largest) == "drjit":
+        one, two, three = (
+            images(*first, [second, third]),
+            images(*second, [first, third]),
+            images(*third, [first, second]),
+        )
+        return one, two, three
+    result = images(*stacked((0, 1, 2)), [stacked((1, 2, 0)), stacked((2, 0, 1))])  # a third of the code to compile
+    one, two, three = [Image(*(part[i] for part in result)) for i in range(3)]
+    return one, two, three
 
 
 def inside(w1: Array, w2: Array, slack: Array | float = 0.0) -> Array:
@@ -82,7 +99,7 @@ def inside(w1: Array, w2: Array, slack: Array | float = 0.0) -> Array:
 class _Guess(NamedTuple):
     """Unknowns near a solution, Newton's step for them, not yet taken, and how far rounding carries.
 
-    rows: of the inverse of the derivatives of the sum below; zero where `regular` does not hold. error: largest
+    rows: of the inverse of the derivatives of the sum below; zero on folds. error: largest
     component of that sum, relative to its terms. slack, slack_x: what is forgiven. direct: the ray has a direction.
     """
 
@@ -94,7 +111,6 @@ class _Guess(NamedTuple):
     error: Array
     slack: Array
     slack_x: Array
-    regular: Array
     direct: Array
 
 
@@ -115,25 +131,21 @@ class _Scaled:
         self.f = [_times(_minus(rays[i], rays[2]), self.per_length) for i in range(2)]
         self.eps = epsilon(self.per_distance + self.per_length)
 
-    def cubic(self) -> tuple[Array, Array, Array, Array]:
-        """Coefficients of N . (a3 + x d3) with N = (e1 + x f1) x (e2 + x f2), up to a factor.
-
-        From the differences e and f, because a and d may be large beside them.
-        """
-        (e1, f1), (e2, f2) = [_scaled_together(self.e[i], self.f[i]) for i in range(2)]
-        n0, n1, n2 = _cross(e1, e2), _plus(_cross(e1, f2), _cross(f1, e2)), _cross(f1, f2)
-        a, d = self.a[2], self.d[2]
-        return _dot(n0, a), _dot(n1, a) + _dot(n0, d), _dot(n2, a) + _dot(n1, d), _dot(n2, d)
-
     def image(self, x: Array, exists: Array, others: list[Root]) -> tuple[_Guess, Array]:
         """The weights at a root of the cubic, polished together with it, and whether they are an image."""
-        now = self.guess(*self.weights(x), x)
-        for _ in range(POLISH):
-            trial = self.guess(now.w1 - now.steps[0], now.w2 - now.steps[1], now.x - now.steps[2])
-            better = now.regular & (trial.error <= now.error)
+
+        def step(now: _Guess) -> _Guess:
+            trial = self.guess(*(u - step for u, step in zip(now[:3], now.steps, strict=True)))
+            better = trial.error <= now.error
             for root, there in others:  # each image stays with its own root
                 better = better & (~there | (absolute(trial.x - x) <= absolute(trial.x - root)))
-            now = _chosen(better, trial, now)
+            return _chosen(better, trial, now)
+
+        w1, w2 = self.weights(x)
+        zero = 0.0 * (w1 + w2 + x)
+        zeros, no = (zero, zero, zero), zero > 1.0
+        blank = _Guess(w1 + zero, w2 + zero, x + zero, (zeros, zeros, zeros), zeros, zero + 1e9, zero, zero, no)
+        now = repeat(step, blank, POLISH + 1)
         normal, _, _, alpha, beta = self.plane(now.x)
         spread = [_largest(self.e[i]) + absolute(now.x) * _largest(self.f[i]) for i in range(2)]
         flat = _largest(normal) * alpha * beta <= COLLAPSED * self.eps * spread[0] * spread[1]
@@ -162,6 +174,8 @@ class _Scaled:
         value = _weighted(w, terms)
         sizes = [_along(_absolute(self.a[i]), absolute(x), _absolute(self.d[i])) for i in range(3)]
         size = _weighted(_absolute(w), sizes)
+        # The third weight is as exact as the sum that it comes from.
+        bound = _weighted((absolute(w1), absolute(w2), 1.0 + absolute(w1) + absolute(w2)), sizes)
         normal, a, b, alpha, beta = self.plane(x)
         direction = _weighted(w, self.d)
         longest = _largest(*[_times(self.d[i], w[i]) for i in range(3)])
@@ -176,13 +190,12 @@ class _Scaled:
         )
         forgiven = SLACK * self.eps
         carried = [forgiven * _dot(_absolute(row), size) for row in rows]
-        relative = [absolute(u) / where(s > 0, s, 1.0) for u, s in zip(value, size, strict=True)]
+        relative = [absolute(u) / where(s > 0, s, 1.0) for u, s in zip(value, bound, strict=True)]
         return _Guess(
             *(w1, w2, x, rows, (_dot(rows[0], value), _dot(rows[1], value), _dot(rows[2], value))),
             error=maximum(maximum(relative[0], relative[1]), relative[2]),
             slack=minimum(forgiven + maximum(carried[0], carried[1]), LARGEST_SLACK),
             slack_x=minimum(forgiven + carried[2], LARGEST_SLACK),
-            regular=regular,
             direct=_largest(direction) > COLLAPSED * self.eps * longest,
         )
 
@@ -206,7 +219,7 @@ def _chosen(condition: Array, new: Any, old: Any) -> Any:
     if not isinstance(new, tuple):
         return where(condition, new, old)
     parts = [_chosen(condition, x, y) for x, y in zip(new, old, strict=True)]
-    return type(new)(*parts) if hasattr(new, "_fields") else tuple(parts)
+    return type(new)(*parts) if isinstance(new, _Guess) else tuple(parts)
 
 
 def _below(a: Triple, limit: float) -> Triple:
@@ -256,7 +269,7 @@ def _cross(a: Triple, b: Triple) -> Triple:
 def _largest(*vectors: Triple) -> Array:
     """Largest magnitude of all components."""
     result = absolute(vectors[0][0])
-    for x in [x for vector in vectors for x in vector][1:]:
+    for x in [x for a in vectors for x in a][1:]:
         result = maximum(result, absolute(x))
     return result
 
@@ -266,9 +279,3 @@ def _unit(a: Triple) -> tuple[Triple, Array]:
     length = _largest(a)
     length = where(length > 0, length, 1.0)
     return _times(a, 1.0 / length), length
-
-
-def _scaled_together(a: Triple, b: Triple) -> tuple[Triple, Triple]:
-    length = _largest(a, b)
-    factor = 1.0 / where(length > 0, length, 1.0)
-    return _times(a, factor), _times(b, factor)

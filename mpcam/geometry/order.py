@@ -16,7 +16,7 @@ def interleaved(cells: np.ndarray) -> np.ndarray:
 
 
 def nearby(points: np.ndarray) -> np.ndarray:
-    """Numbers of points (N, 3) such that those next to each other lie close together; points that are not finite last."""
+    """Numbers of points (N, 3), so that neighbours lie close together; points that are not finite come last."""
     finite = np.isfinite(points).all(axis=1)
     some = points[finite]
     low, high = (some.min(0), some.max(0)) if len(some) else (np.zeros(3), np.ones(3))

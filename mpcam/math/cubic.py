@@ -4,13 +4,19 @@ After Yuksel, "High-performance polynomial root finding for graphics" (2022): th
 into monotone pieces, and each piece has one root at most.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from mpcam.math.arrays import Array, absolute, detach, epsilon, maximum, minimum, sqrt, where
 from mpcam.math.roots import bracketed_newton, polynomial
+from mpcam.math.vectors import Vector
 
 STEPS = 8
 """Newton's steps per root: the start is off by a factor of two at most, so that these reach float64."""
+
+Pair = tuple[Array, Array]
 
 
 class Root(NamedTuple):
@@ -27,6 +33,8 @@ def cubic_roots(k0: Array, k1: Array, k2: Array, k3: Array, low: Array, high: Ar
     not at all. The polynomial that is zero has no roots here. Derivatives with respect to the coefficients come from
     the implicit-function theorem; they are zero at double roots.
     """
+    if all(type(k) in (int, float) for k in (k0, k1, k2, k3)):
+        k0 = np.float64(k0)  # so that comparisons can be negated by ~
     given = (k0, k1, k2, k3)
     largest = maximum(absolute(low), absolute(high))
     reach = where(largest > 0, largest, 1.0)
@@ -38,18 +46,26 @@ def cubic_roots(k0: Array, k1: Array, k2: Array, k3: Array, low: Array, high: Ar
     zero = 0.0 * (k[0] + k[1] + k[2] + k[3])  # of the type and shape that the result has
     low, high = zero + low / reach, zero + high / reach
     first, inflection, last, monotone = _turns(k, low, high)
-    left_half = (inflection != first) & _opposite(polynomial(k, first), polynomial(k, inflection))
-    start, end = where(left_half, first, last), where(left_half, last, first)
-    # From its anchor, an extremum or the inflection, each piece rises or falls as a power of the distance.
+    at_first, at_middle, at_last = polynomial(k, first), polynomial(k, inflection), polynomial(k, last)
+    left_half = (inflection != first) & _opposite(at_first, at_middle)
+    outer, at_outer = where(left_half, first, last), where(left_half, at_first, at_last)
+    # The middle piece is entered from an extremum, or from the inflection if that is nearer in value.
+    inward = absolute(at_outer) <= absolute(at_middle)
+    anchor = where(inward, outer, inflection)
+    end = where(left_half == inward, last, first)
     found = (
         _piece(k, first, low, first - low),
-        _piece(k, start, end, absolute(inflection - start)),
+        _piece(k, anchor, end, absolute(inflection - outer)),
         _piece(k, last, high, high - last),
     )
-    twice = monotone & found[0][1] & (polynomial(k, last) == 0)  # a single root at the inflection
+    twice = monotone & found[0][1] & (at_last == 0)  # a single root at the inflection
     exists = (found[0][1] & some, found[1][1] & some & ~monotone, found[2][1] & some & ~twice)
-    roots = [where(there, root * reach, 0.0) for (root, _), there in zip(found, exists, strict=True)]
-    return tuple(Root(_differentiable(given, x, there), there) for x, there in zip(roots, exists, strict=True))
+
+    def result(i: int) -> Root:
+        x = where(exists[i], found[i][0] * reach, 0.0)
+        return Root(_differentiable(given, x, exists[i]), exists[i])
+
+    return result(0), result(1), result(2)
 
 
 def _turns(k: list[Array], low: Array, high: Array) -> tuple[Array, Array, Array, Array]:
@@ -78,7 +94,7 @@ def _piece(k: list[Array], anchor: Array, end: Array, distance: Array) -> tuple[
     """The root between an anchor and the end of its monotone piece, at most `distance` away, and whether there is one.
 
     With s the distance from the anchor, |f(s) - f(0)| is about slope s + bend s^2 + |k3| s^3; the least s at which one
-    term makes up for |f(0)| is above the root (up to 1.3 in the piece between the extrema), and below twice the root.
+    term makes up for |f(0)| is between half and twice the root, and above 1 / 1.3 of it.
     """
     start, stop = polynomial(k, anchor), polynomial(k, end)
     exists = (anchor != end) & _opposite(start, stop)
@@ -121,3 +137,58 @@ def _differentiable(k: tuple[Array, ...], x: Array, exists: Array) -> Array:
     steep = exists & (absolute(slope) > 0)
     step = polynomial(k, x) / where(steep, slope, 1.0)
     return where(steep, x - (step - detach(step)), x)
+
+
+def determinant_cubic(a: Sequence[Vector], d: Sequence[Vector]) -> tuple[Array, Array, Array, Array]:
+    """Coefficients k0..k3 of det[a_i + x d_i] for three vectors each, exact but for the last rounding.
+
+    Their terms cancel where the vectors are nearly parallel or in one plane, and then they would be lost in rounding
+    although the roots are not; so every number here is a pair, of a value and of what rounding took from it (Dekker
+    1971). No vectors of numbers are formed, so components may broadcast.
+    """
+    e, f = [[[_difference(x, y) for x, y in zip(m[i], m[2], strict=True)] for i in range(2)] for m in (a, d)]
+    tail_a, tail_d = [[(x, 0.0 * x) for x in m[2]] for m in (a, d)]
+    n0, n2 = _cross(e[0], e[1]), _cross(f[0], f[1])
+    n1 = [_add(x, y) for x, y in zip(_cross(e[0], f[1]), _cross(f[0], e[1]), strict=True)]
+    k1, k2 = _add(_dot(n1, tail_a), _dot(n0, tail_d)), _add(_dot(n2, tail_a), _dot(n1, tail_d))
+    return _dot(n0, tail_a)[0], k1[0], k2[0], _dot(n2, tail_d)[0]
+
+
+def _sum(x: Array, y: Array) -> Pair:
+    total = x + y
+    part = total - x
+    return total, (x - (total - part)) + (y - part)
+
+
+def _difference(x: Array, y: Array) -> Pair:
+    return _sum(x, -y)
+
+
+def _halves(x: Array) -> Pair:
+    """The upper half of the bits and the rest."""
+    wide = x * (4097.0 if epsilon(x) > 1e-10 else 134217729.0)
+    upper = wide - (wide - x)
+    return upper, x - upper
+
+
+def _multiply(x: Pair, y: Pair) -> Pair:
+    product, (a, b), (c, d) = x[0] * y[0], _halves(x[0]), _halves(y[0])
+    rest = ((a * c - product) + a * d + b * c) + b * d
+    return _sum(product, rest + (x[0] * y[1] + x[1] * y[0]))
+
+
+def _add(x: Pair, y: Pair) -> Pair:
+    total, rest = _sum(x[0], y[0])
+    return _sum(total, rest + (x[1] + y[1]))
+
+
+def _cross(a: Sequence[Pair], b: Sequence[Pair]) -> list[Pair]:
+    def component(i: int, j: int) -> Pair:
+        first, second = _multiply(a[i], b[j]), _multiply(a[j], b[i])
+        return _add(first, (-second[0], -second[1]))
+
+    return [component(1, 2), component(2, 0), component(0, 1)]
+
+
+def _dot(a: Sequence[Pair], b: Sequence[Pair]) -> Pair:
+    return _add(_add(_multiply(a[0], b[0]), _multiply(a[1], b[1])), _multiply(a[2], b[2]))

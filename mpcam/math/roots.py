@@ -60,11 +60,11 @@ def bracketed_newton(
         after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
         return below, above, after, absolute(after - x)
 
-    return _repeat(step, (below, above, start, above - below), steps)[2]
+    return repeat(step, (below, above, start, above - below), steps)[2]
 
 
-def _repeat(step: Callable[[Any], Any], state: Any, steps: int) -> Any:
-    """The state after all steps; JAX compiles one step only."""
+def repeat(step: Callable[[Any], Any], state: Any, steps: int) -> Any:
+    """The state, a tuple of arrays, after all steps; JAX compiles one step only."""
     if library(*state) == "jax":
         import jax
 

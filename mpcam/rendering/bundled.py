@@ -1,9 +1,9 @@
-"""Exact rasterization where rays have no common centre: candidates by a hierarchy of bundles, then inversion per pixel."""
+"""Exact rasterization where rays have no common centre: bundles of them against clusters, then pixel by pixel."""
 
 import copy
 import functools
-from dataclasses import replace
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats, View
 from mpcam.rendering.layout import Layout, layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
-
 
 BOUNDS = ("tight", "triangle", "nine_point")
 CULLING = ("objects", "triangles")
@@ -77,7 +76,6 @@ class Bundled:
     def run(self, done: Callable[[str, Any], None] | None = None, count: bool = False) -> tuple[Any, Any]:
         """Keys of all places, and counters or None; done(stage, arrays) is told of each stage."""
         from mpcam_kernels.backend import backend_name
-
         from mpcam_kernels.bundle_pipeline import Task
 
         rays, (order, counts) = self.rays, self.tree

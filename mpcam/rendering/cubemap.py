@@ -110,7 +110,9 @@ class Cubemapped:
                 return depth * 0.0, depth * 0.0
             directions = _texel_directions(texel, self.resolution, self.half)
             front = self.faces[0]  # its frame is the camera's own
-            found = decode.weights(types(), central, frames[0][0][0], front.faces, triangle, directions)
+            found = decode.weights(
+                types(), central, frames[0][0][0], front.faces, triangle, directions, types().Array4f
+            )
             dr.eval(found)
             return found
 

@@ -109,7 +109,7 @@ def lens_key(camera: Camera) -> tuple[Any, ...]:
 
 
 def _plain(value: Any) -> Any:
-    """A number of any library, a table of them or a tuple, in a form that is hashable, and the same for the same numbers."""
+    """Numbers of any library, tables and tuples of them in a hashable form, the same for the same ones."""
     if isinstance(value, tuple):
         return tuple(_plain(v) for v in value)
     if value is None or isinstance(value, (str, int, Profile)):

@@ -33,7 +33,7 @@ class Stats:
 
 @dataclass(frozen=True)
 class View:
-    """The rays that hits were found with. ray: on the device, one per pixel, in a frame; pose: 4x4, frame from world."""
+    """The rays that hits were found with: on the device, one per pixel, in a frame. pose: 4x4, frame from world."""
 
     pose: np.ndarray
     ray: Ray

@@ -1,6 +1,7 @@
 """Mirror reflection and refraction of directions, components first, for NumPy, JAX and Dr.Jit arrays alike."""
 
-from mpcam.math import Array, Vector, dot, normalize, safe_sqrt, vector, where
+from mpcam.math.arrays import Array, safe_sqrt, where
+from mpcam.math.vectors import Vector, dot, normalize, vector
 
 
 def reflect(incident: Vector, normal: Vector) -> Vector:
