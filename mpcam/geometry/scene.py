@@ -8,6 +8,7 @@ import numpy as np
 
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mirror import Mirror
 
 Vector = tuple[float, float, float]
 
@@ -57,7 +58,8 @@ class Scene:
     """What is rendered: meshes in world coordinates, lights, and a camera.
 
     meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
-    linear RGB. Raises InputError where a field has the wrong kind.
+    linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. environment: an
+    EnvironmentMap that rays see which miss everything, in place of the background. Raises InputError where a field has the wrong kind.
     """
 
     meshes: tuple[Mesh, ...]
@@ -66,12 +68,18 @@ class Scene:
     ambient: Vector = (0.15, 0.15, 0.15)
     background: Vector = (0.0, 0.0, 0.0)
     name: str = "scene"
+    mirror: Mirror | None = None
+    environment: Any = None
 
     def __post_init__(self):
         object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
         object.__setattr__(self, "lights", _several(self.lights, Light, "lights", "DirectionalLight or PointLight"))
         object.__setattr__(self, "ambient", _vector(self.ambient, "ambient", positive=True))
         object.__setattr__(self, "background", _vector(self.background, "background", positive=True))
+        if self.mirror is not None and not isinstance(self.mirror, Mirror):
+            raise InputError(f"scene mirror is a {type(self.mirror).__name__}: give mpcam.Mirror(surface)")
+        if self.environment is not None and not hasattr(self.environment, "on_device"):
+            raise InputError(f"scene environment is a {type(self.environment).__name__}: give an mpcam.EnvironmentMap")
 
     @cached_property
     def mesh(self) -> Mesh:

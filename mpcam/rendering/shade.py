@@ -145,12 +145,14 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
     t = types()
     background = opaque_numbers(list(scene.background))
     if hits.mesh.triangle_count == 0:
-        colour = t.Array3f(*background) + hits.device_depth * 0.0
-        colour = dr.select(dr.isfinite(colour), colour, t.Array3f(*background))
+        data = {"background": background} | (_environment(hits, scene) if scene.environment is not None else {})
+        colour = _unhit(t, data) + dr.zeros(t.Array3f, dr.width(hits.device_depth))
         dr.eval(colour)
         return colour
     table, weights = attributes(scene.mesh), hits.device_weights
     data: dict[str, Any] = {"faces": table.faces, "background": background}
+    if scene.environment is not None:
+        data |= _environment(hits, scene)
     if shading != "normal":
         data |= {"material": table.material, "base": table.base}
         data |= {"colors": table.colors} if table.tinted else {}
@@ -159,8 +161,7 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
             data["uv"] = table.uv
     if shading in ("normal", "light"):
         ray = hits.view.ray
-        pose = opaque_numbers([*np.asarray(hits.view.pose, np.float64)[:3, :3].ravel()])
-        data |= {"normals": table.normals, "pose": pose, "direction": ray.direction}
+        data |= {"normals": table.normals, "pose": _rotation(hits), "direction": ray.direction}
     kinds: tuple[str, ...] = ()
     if shading == "light":
         kinds = tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
@@ -224,9 +225,27 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
                 colour *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
             else:
                 colour *= _lit(t, data, lights, normal, face, hit)
-        return dr.select(hit, colour, t.Array3f(*data["background"]))
+        return dr.select(hit, colour, _unhit(t, data))
 
     return kernel
+
+
+def _rotation(hits: Hits) -> list[Any]:
+    """The nine numbers of the rotation from the world to the frame of the hits' rays, on the device."""
+    return opaque_numbers([*np.asarray(hits.view.pose, np.float64)[:3, :3].ravel()])
+
+
+def _environment(hits: Hits, scene: Scene) -> dict[str, Any]:
+    """What look-ups in the scene's environment need."""
+    rays = {"pose": _rotation(hits), "direction": hits.view.ray.direction}
+    return {"environment": scene.environment.on_device, **rays}
+
+
+def _unhit(t: Any, data: dict[str, Any]) -> Any:
+    """What is seen where nothing is hit."""
+    if "environment" not in data:
+        return t.Array3f(*data["background"])
+    return data["environment"].lookup(_to_world(t, data["pose"], data["direction"]))
 
 
 def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> Any:

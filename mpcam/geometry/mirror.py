@@ -1,0 +1,43 @@
+"""What bends rays in a scene: a curved mirror, or the face of a lens or of water."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.surfaces import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """A smooth surface in which the rest of a scene is seen.
+
+    surface: a Mesh (smooth unless it has facets' normals) or a Surface. index: None for a mirror; else the refractive
+    index behind the surface over that on the camera's side, and the scene is seen through it. color: linear RGB, what
+    is seen is multiplied by it. triangles, resolution: the camera triangles that stand for it, and pixels along the
+    short sides of each. Raises InputError for a field of the wrong kind.
+    """
+
+    surface: Any
+    index: float | None = None
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    triangles: int = 104
+    resolution: int = 64
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.surface, (Mesh, Surface)):
+            raise InputError(
+                f"mirror surface is a {type(self.surface).__name__}: give a Mesh or a Surface, e.g. Surface.sphere()"
+            )
+        if self.index is not None:
+            number = isinstance(self.index, (int, float, np.number)) and not isinstance(self.index, bool)
+            if not number or not (np.isfinite(self.index) and self.index > 0):
+                raise InputError(
+                    f"mirror index={shown(self.index)}: give a finite number above 0, or None for a mirror"
+                )
+        color = np.asarray(self.color, np.float64) if np.shape(self.color) == (3,) else np.full(3, np.nan)
+        if not np.isfinite(color).all() or (color < 0).any():
+            raise InputError(f"mirror color={shown(self.color)}: give 3 finite linear RGB numbers, none negative")
+        object.__setattr__(self, "color", (float(color[0]), float(color[1]), float(color[2])))
