@@ -136,23 +136,28 @@ def render(
     resolution: int | None = None,
     bound: str | None = None,
     cull: str | None = None,
+    triangles: int | None = None,
     explain: bool = False,
 ) -> None:
     """Render a scene or mesh to an image file; an EXR also keeps the depth and the camera.
 
+    Where the scene has a mirror, the rest is seen in it: by camera triangles (--method invert), by an environment map
+    (environment) or by rays of the true surface (raytrace).
+
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
-        method: invert, vertex, cubemap, hemicube or raytrace.
+        method: invert, vertex, cubemap, hemicube or raytrace; with a mirror also environment.
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.
         shadows: Let the scene's lights cast shadows, by a shadow map each.
         shadow_size: Pixels along a side of those; 1024 if not given.
         level: Times that --method vertex halves each edge.
-        resolution: Pixels along a face of --method cubemap and hemicube.
+        resolution: Pixels along a face of --method cubemap and hemicube, or along the short sides of camera triangles.
         bound: tight, triangle or quad, for --method invert.
         cull: none, back or front: the side of triangles that --method invert does not show.
+        triangles: Camera triangles that stand for the scene's mirror; its own number if not given.
         explain: Print which stages run, which are left out, and why.
     """
     from rich.console import Console
@@ -170,8 +175,20 @@ def render(
     _check_machine()
     loaded = _load(scene, size).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
-    asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull}
+    asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull, "triangles": triangles}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    if loaded.mirror is not None:
+        from mpcam.rendering.methods import render as picture
+
+        with Console(stderr=True).status(f"rendering {loaded.name}"):
+            texels = 1024 if shadow_size is None else shadow_size
+            options: dict[str, Any] = {"shading": shading, "shadows": shadows, "shadow_size": texels}
+            image = picture(camera, loaded, method, explain=explain, **options, **settings)
+            if layers:
+                write_image(output, image, camera=camera)
+            else:
+                write_image(output, image)
+        return
     if explain:
         from mpcam.rendering.explain import explain as explained
 

@@ -89,7 +89,8 @@ def _ray(bend: Bend, v: Any, n: Any, second: Array, third: Array) -> tuple[Vecto
 def _in_part(bend: Bend, corners: Any, v: Any, n: Any, q: Vector) -> list[Image]:
     """Images that are found from the linear rays between three places of a camera triangle."""
     rays = _rays(bend, corners, v, n, 0.0 * (q[0] + v[0][0]))
-    starts = three_rays.project(*(_widened([one[k] for one in rays]) for k in range(2)), q)
+    origins, ways = (_widened([one[k] for one in rays]) for k in range(2))
+    starts = three_rays.project(origins, ways, q)
     places = _widened([np.array(corner) for corner in corners])
     found = []
     for start in starts:

@@ -20,17 +20,20 @@ SLACK = 4.0
 LARGEST_SLACK = 2.0**-10
 """The same at most, as a weight, and as a fraction of the distance."""
 
-RESIDUAL = 32.0
+RESIDUAL = 64.0
 """Largest |p + c D - q| of an image, component by component, in units of eps times the sum of the magnitudes."""
 
 COLLAPSED = 16.0
-"""Swept triangles whose sine is below this many eps have collapsed; so have ray directions shorter than that."""
+"""Swept triangles whose normal is uncertain by 1 / this have collapsed, and so have rays whose direction is."""
 
 FOLD = 2.0**-6
 """Where the determinant of the derivatives, columns scaled to 1, is below this many eps, an image has no derivative."""
 
-POLISH = 2
+POLISH = 3
 """Newton's steps on all three unknowns, after the cubic."""
+
+AWAY = 64.0
+"""Growth of the residual that one of these steps may cause while it is too large."""
 
 FAR = 1e9
 """Weights are kept within this, so that they do not overflow."""
@@ -136,7 +139,10 @@ class _Scaled:
 
         def step(now: _Guess) -> _Guess:
             trial = self.guess(*(u - step for u, step in zip(now[:3], now.steps, strict=True)))
-            better = trial.error <= now.error
+            # The first steps may lead away; as long as there is no image yet, they are not held to every one.
+            better = (trial.error <= now.error) | (
+                (now.error > 0.5 * RESIDUAL * self.eps) & (trial.error <= AWAY * now.error)
+            )
             for root, there in others:  # each image stays with its own root
                 better = better & (~there | (absolute(trial.x - x) <= absolute(trial.x - root)))
             return _chosen(better, trial, now)
@@ -148,7 +154,7 @@ class _Scaled:
         now = repeat(step, blank, POLISH + 1)
         normal, _, _, alpha, beta = self.plane(now.x)
         spread = [_largest(self.e[i]) + absolute(now.x) * _largest(self.f[i]) for i in range(2)]
-        flat = _largest(normal) * alpha * beta <= COLLAPSED * self.eps * spread[0] * spread[1]
+        flat = _largest(normal) <= COLLAPSED * self.eps * (spread[0] / alpha + spread[1] / beta)
         valid = exists & ~flat & now.direct & (now.error <= RESIDUAL * self.eps)
         return now, valid & inside(now.w1, now.w2, now.slack) & (now.x >= -now.slack_x)
 

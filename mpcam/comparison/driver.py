@@ -9,6 +9,7 @@ import numpy as np
 
 from mpcam.comparison import metrics, timing
 from mpcam.comparison.facts import machine_facts, scene_facts
+from mpcam.comparison.mirrors import mirror_plan, mirror_rows
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.plan import Choice, make_plan
 from mpcam.comparison.progress import Progress, Steps
@@ -67,6 +68,8 @@ def compare(
     if output is not None:
         check_output(output)
     mesh = scene.mesh
+    if scene.mirror is not None:
+        return _mirrored(scene, camera, mirror_plan(methods, settings), repeats, output, progress, shading, moving)
     plan = make_plan(mesh.triangle_count, methods, settings)
     each = 1 + (1 + WARMUP + repeats) * (3 if moving else 2)
     steps = Steps(progress, 2 + len(plan) * each)
@@ -138,6 +141,52 @@ def compare(
         images=images,
         truth_image=truth_image,
         truth_depth=np.asarray(truth.depth),
+        camera=camera,
+    )
+    if output is not None:
+        comparison.write(output)
+    steps.done("report" if output is not None else "done")
+    return comparison
+
+
+def _mirrored(
+    scene: Any,
+    camera: Any,
+    plan: list[Choice],
+    repeats: int,
+    output: str | Path | None,
+    progress: Progress | None,
+    shading: str,
+    moving: bool,
+) -> Comparison:
+    """`compare` for a scene with a mirror."""
+    each = 1 + (WARMUP + repeats) * (2 if moving else 1)
+    steps = Steps(progress, 2 + len(plan) * each)
+    rows, images, truth = mirror_rows(
+        scene,
+        camera,
+        plan,
+        shading=shading,
+        repeats=repeats,
+        warmup=WARMUP,
+        moving=moving_vertices(scene.mesh) if moving else None,
+        steps=steps,
+    )
+    front = pareto_front([row.flip for row in rows], [row.still_ms for row in rows])
+    how = _how(repeats, moving) | {
+        "still": "a whole picture when all building is done: what is beside the mirror and in it, both shaded",
+        "truth": "rays of the mirror's true surface, traced by Mitsuba, and the same shading of their first hits",
+    }
+    surface = scene.mirror.surface
+    facts = {"mirror": f"{type(surface).__name__}" + (f", index {scene.mirror.index}" if scene.mirror.index else "")}
+    comparison = Comparison(
+        rows=tuple(replace(row, on_front=bool(on)) for row, on in zip(rows, front, strict=True)),
+        name=scene.name,
+        scene=scene_facts(scene, camera, shading) | facts,
+        machine=machine_facts(),
+        measured={name: text for name, text in how.items() if name != "projection error"},
+        images=images,
+        truth_image=truth,
         camera=camera,
     )
     if output is not None:

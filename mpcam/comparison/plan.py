@@ -10,7 +10,13 @@ from mpcam.rendering.methods import METHODS
 MAX_TRIANGLES = 4_000_000
 LEVELS = (0, 1, 2, 3, 4)
 RESOLUTIONS = (64, 128, 256, 512)
-PARAMETER = {"vertex": "level", "cubemap": "resolution", "hemicube": "resolution"}
+PARAMETER = {
+    "vertex": "level",
+    "cubemap": "resolution",
+    "hemicube": "resolution",
+    "camera_triangles": "triangles",
+    "environment": "size",
+}
 """The setting that trades time for error, by method; methods without one are compared as they are."""
 
 

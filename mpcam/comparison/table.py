@@ -46,6 +46,9 @@ ERROR_COLUMNS = (
     ),
     Column("projection_p95", "Projection error, 95%", "px", "95th percentile of the projection error."),
     Column("projection_max", "Projection error, largest", "px", "Largest projection error."),
+    Column(
+        "ray_angle", "Ray error", "mrad", "Root mean square angle between camera triangles' rays and the true ones."
+    ),
 )
 PSNR_COLUMN = Column("psnr", "PSNR", "dB", "Peak signal-to-noise ratio in sRGB space, peak 1; infinite when equal.")
 TIME_COLUMNS = (
@@ -86,6 +89,7 @@ class Row:
     projection_median: float = NAN
     projection_p95: float = NAN
     projection_max: float = NAN
+    ray_angle: float = NAN
     still_ms: float = NAN
     still_spread: float = NAN
     moving_ms: float = NAN

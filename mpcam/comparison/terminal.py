@@ -25,6 +25,14 @@ _NUMBERS = (
 )
 
 
+_MIRROR = (
+    ("flip", "FLIP"),
+    ("psnr", "PSNR\ndB"),
+    ("ray_angle", "Rays\nmrad"),
+    ("overdraw", "Tests\nper hit"),
+)
+
+
 def print_comparison(comparison: "Comparison", console: "Console | None" = None) -> None:
     """Print the table, what was left out and who wins, at most 100 columns wide."""
     from rich.console import Console
@@ -80,12 +88,13 @@ def _table(comparison: "Comparison"):
     )
     table.add_column("", width=1)
     table.add_column("Method", no_wrap=True)
-    for _, heading in _NUMBERS:
+    shown = _NUMBERS if np.isnan(comparison.column("ray_angle")).all() else _MIRROR
+    for _, heading in shown:
         table.add_column(heading, justify="right", no_wrap=True)
     for heading in ("Still\nms", "Moving\nms"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in comparison.rows:
-        numbers = [format_column(name, getattr(row, name), 2) for name, _ in _NUMBERS]
+        numbers = [format_column(name, getattr(row, name), 2) for name, _ in shown]
         table.add_row(
             "*" if row.on_front else "", Text(row.label), *numbers, *_times(row), style="bold" if row.on_front else ""
         )

@@ -1,7 +1,7 @@
 """Environment maps: what is seen from one point, in all directions, as two paraboloid views (Gascuel et al. 2008)."""
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,32 @@ class EnvironmentMap:
         check_size(shapes[0][0])
         self.images = images
 
+    @classmethod
+    def from_panorama(cls, image: Any, size: int | None = None) -> "EnvironmentMap":
+        """The map of a latitude-longitude picture (H, W, 3), linear RGB: infinitely far surroundings.
+
+        Its middle column is world +x, columns to the left are towards +y, the top row is +z. size: pixels along a side
+        of each view; default: half of the picture's width. Raises InputError for other shapes.
+        """
+        picture = np.asarray(image, np.float32)
+        if picture.ndim != 3 or picture.shape[2] != 3 or min(picture.shape[:2]) < 2:
+            raise InputError(f"panorama has shape {picture.shape}: give (H, W, 3), twice as wide as high")
+        height, width, _ = picture.shape
+        size = check_size(max(8, width // 2) if size is None else size)
+        u, v = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
+        views = []
+        for camera in back_to_back((0.0, 0.0, 0.0), size):
+            x, y, z = np.moveaxis(camera.ray(np.stack([u, v], -1)).direction, -1, 0)
+            column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * width - 0.5
+            row = np.clip(np.arccos(np.clip(z, -1, 1)) / np.pi * height - 0.5, 0, height - 1)
+            left, top = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), height - 2)
+            fx, fy = (column - left)[..., None], (row - top)[..., None]
+            here, there = left % width, (left + 1) % width
+            upper = picture[top, here] * (1 - fx) + picture[top, there] * fx
+            lower = picture[top + 1, here] * (1 - fx) + picture[top + 1, there] * fx
+            views.append((upper * (1 - fy) + lower * fy).astype(np.float32))
+        return cls((0.0, 0.0, 0.0), (views[0], views[1]))
+
     @functools.cached_property
     def cameras(self) -> tuple[Radial, Radial]:
         """The cameras of the two pictures."""
@@ -89,12 +115,12 @@ def environment_map(
 ) -> EnvironmentMap:
     """Colours of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
 
-    scene: a Scene, a Mesh or several meshes. position (3,): world, away from surfaces. size: pixels along a side of
-    each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.
+    scene: a Scene, a Mesh or several meshes; its mirror is left out. position (3,): world, away from surfaces. size:
+    pixels along a side of each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.
     """
     from mpcam.rendering.methods import render
 
     cameras = back_to_back(as_vector(position, "position"), check_size(size))
-    whole = Scene.of(scene)
+    whole = replace(Scene.of(scene), mirror=None)
     front, back = (render(camera, whole, method, shading=shading, **settings) for camera in cameras)
     return EnvironmentMap(position, (front, back))

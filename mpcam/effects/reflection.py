@@ -1,9 +1,10 @@
-"""Pictures of scenes with a curved mirror or lens face: near objects in it, by camera triangles (Hou et al. 2006, 3.1-2).
+"""Pictures of scenes with a curved mirror or lens face, near objects in it, by camera triangles (Hou et al. 2006).
 
 The same picture by other means, to compare with: an environment map, and rays traced from the true surface.
 """
 
 import functools
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,8 +14,8 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.decomposition.resolve import Resolver
-from mpcam.effects.environment import environment_map
-from mpcam.effects.lookup import check_size
+from mpcam.effects.environment import DeviceEnvironment
+from mpcam.effects.lookup import back_to_back, check_size
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
@@ -22,8 +23,10 @@ from mpcam.geometry.mirror import Mirror
 from mpcam.geometry.scene import Scene
 from mpcam.rendering.device import opaque_numbers, opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.explain import Explanation, Step
+from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
-from mpcam.rendering.shade import check_shading, shade_device
+from mpcam.rendering.shade import check_shading, check_shadows, shade_device
 
 METHODS = ("camera_triangles", "environment", "raytrace")
 
@@ -47,7 +50,8 @@ class Reflection:
     default the scene's. method: "camera_triangles"; "environment", an environment map from the mirror's middle, two
     views of `size` pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as for `render`; rays
     that miss the scene see its environment, or its background. triangles, resolution: in place of the mirror's. cams:
-    camera triangles to take instead of decomposing the mirror. Raises InputError for a scene without mirror or camera,
+    camera triangles to take instead of decomposing the mirror. shadows: shadow maps of the scene's lights (see
+    `shadow_map`), in which the mirror itself throws none. Raises InputError for a scene without mirror or camera,
     an eye that does not see it, and other values.
     """
 
@@ -64,8 +68,9 @@ class Reflection:
         resolution: int | None = None,
         size: int = 512,
         cams: CameraTriangles | None = None,
+        shadows: Sequence[Any] = (),
     ):
-        self.scene, self.method, self.shading = scene, method, shading
+        self.scene, self.method, self.shading, self.shadows = scene, method, shading, shadows
         given = camera if camera is not None else scene.camera
         found = mirror if mirror is not None else scene.mirror
         if found is None:
@@ -75,6 +80,7 @@ class Reflection:
         if not isinstance(given, Camera) or not given.central:
             raise InputError("a camera with a common centre is needed to look into a mirror: give one as camera=")
         check_shading(shading)
+        check_shadows(shadows, scene, shading)
         self.camera, self.mirror = given, found
         settings = {"triangles": triangles, "resolution": resolution, "cams": cams}
         idle = [name for name, value in settings.items() if value is not None]
@@ -102,14 +108,63 @@ class Reflection:
     def frame(self) -> Any:
         """One frame on the device: an evaluated Array3f, one entry per pixel."""
         hits = self.direct.frame()
-        beside = shade_device(hits, self.scene, self.shading)
+        beside = self.shaded(hits)
         return _over(hits.device_depth, beside, self.distance, self.part.colours(), self._color)
+
+    def shaded(self, hits: Hits) -> Any:
+        """Colours of hits on the scene, on the device."""
+        return shade_device(hits, self.scene, self.shading, self.shadows)
 
     @exclusive
     def image(self) -> np.ndarray:
         """One frame: (H, W, 3) float32, linear RGB."""
         shape = (self.camera.height, self.camera.width, 3)
         return np.stack([np.asarray(part.numpy()) for part in self.frame()], -1).reshape(shape)
+
+    @property
+    def cams(self) -> CameraTriangles | None:
+        """The camera triangles that stand for the mirror; None for other methods."""
+        return self.part.cams if isinstance(self.part, _ByTriangles) else None
+
+    @property
+    def hits(self) -> Hits:
+        """First hits of the camera triangles' rays. Raises InputError for other methods."""
+        if not isinstance(self.part, _ByTriangles):
+            raise InputError(f"method={self.method!r} has no camera triangles that hit anything")
+        return self.part.prepared.frame()
+
+    @property
+    def explanation(self) -> Explanation:
+        """Which stages a frame takes, which are left out, and why."""
+        triangles, tracing = isinstance(self.part, _ByTriangles), self.method == "raytrace"
+        many = f"{self.cams.count} that the camera sees" if self.cams else ""
+        bent = "its pixels bend the camera's rays by interpolated normals" if triangles else ""
+        other = f"method {self.method!r}"
+        lost = self.scene.environment is not None
+        return Explanation(
+            (
+                Step("direct view", True, f"{self.scene.mesh.triangle_count:,} scene triangles beside the mirror"),
+                Step("camera triangles", triangles, f"{many}; {bent}" if triangles else other),
+                Step(
+                    "candidates",
+                    triangles,
+                    "groups and blocks of rays against clusters of triangles" if triangles else other,
+                ),
+                Step("root finding", False, "rays of pixels are known; only project() needs the cubic"),
+                Step(
+                    "atlas to picture",
+                    triangles,
+                    "texels by the true surface's points, found once" if triangles else other,
+                ),
+                Step(
+                    "environment map",
+                    self.method == "environment",
+                    "two views from the mirror's middle" if self.method == "environment" else other,
+                ),
+                Step("rays of the true surface", tracing, "traced anew in each frame" if tracing else other),
+                Step("rays that miss", lost, "see the scene's environment" if lost else "see the background"),
+            )
+        )
 
     @functools.cached_property
     def rays(self) -> MirrorRays:
@@ -135,7 +190,7 @@ class _ByTriangles:
         mirror = whole.mirror
         if cams is None:
             cams = decompose(mirror.surface, whole.camera, triangles, resolution=resolution, index=mirror.index)
-        self.cams, self.scene, self.shading = cams, whole.scene, whole.shading
+        self.cams, self.whole = cams, whole
         self.resolver = Resolver(cams, mirror.surface, whole.camera)
         self.prepared = prepare(cams, whole.scene.mesh)
         self._nothing = opaque_numbers([0.0, 0.0, 0.0])
@@ -146,31 +201,41 @@ class _ByTriangles:
     def colours(self) -> list[Any]:
         import drjit as dr
 
-        atlas = shade_device(self.prepared.frame(), self.scene, self.shading)
+        atlas = self.whole.shaded(self.prepared.frame())
         return self.resolver.on_device(dr.ravel(atlas), self._nothing)
 
 
 class _ByEnvironment:
-    """One picture of the surroundings from the mirror's middle, looked up along the true rays."""
+    """Two views of the surroundings from the mirror's middle, looked up along the true rays."""
 
     def __init__(self, whole: Reflection, size: int):
-        self.scene, self.shading, self.size = whole.scene, whole.shading, size
-        self.middle = reflector_of(whole.mirror.surface).center
-        self.directions = np.ascontiguousarray(np.asarray(whole.rays.ray.direction).T, np.float32)
+        self.whole, self.size = whole, size
+        middle = reflector_of(whole.mirror.surface).center
+        self.views = [prepare(camera, whole.scene.mesh) for camera in back_to_back(middle, size)]
+        directions = np.ascontiguousarray(np.asarray(whole.rays.ray.direction).T, np.float32)
+        self.directions = types().Array3f(directions) + opaque_zero()
 
     def update(self, vertices: np.ndarray) -> None:
-        from dataclasses import replace
-
-        mesh = self.scene.mesh
-        self.scene = replace(self.scene, meshes=(replace(mesh, vertices=vertices),))
+        for view in self.views:
+            view.update(vertices)
 
     def colours(self) -> list[Any]:
         import drjit as dr
 
-        found = environment_map(self.scene, self.middle, self.size, self.shading).on_device
-        colour = found.lookup(types().Array3f(self.directions))
-        dr.eval(colour)
-        return list(colour)
+        parts: list[Any] = [dr.ravel(self.whole.shaded(view.frame())) for view in self.views]
+        texels = dr.concat(parts)
+        return list(_look_up()(DeviceEnvironment(texels, self.size), self.directions))
+
+
+@functools.cache
+def _look_up() -> Any:
+    from mpcam_kernels.frozen import frozen
+
+    @frozen
+    def looked_up(environment: DeviceEnvironment, directions: Any) -> Any:
+        return environment.lookup(directions)
+
+    return looked_up
 
 
 class _ByTracing:
@@ -179,14 +244,14 @@ class _ByTracing:
     def __init__(self, whole: Reflection):
         from mpcam.truth.raytrace import RayTraced
 
-        self.scene, self.shading = whole.scene, whole.shading
+        self.whole = whole
         self.prepared = RayTraced(whole.camera, whole.scene.mesh, whole.rays.ray)
 
     def update(self, vertices: np.ndarray) -> None:
         self.prepared.update(vertices)
 
     def colours(self) -> list[Any]:
-        return list(shade_device(self.prepared.frame(), self.scene, self.shading))
+        return list(self.whole.shaded(self.prepared.frame()))
 
 
 def _over(depth: Any, beside: Any, distance: Any, colours: list[Any], color: list[Any]) -> Any:

@@ -59,7 +59,8 @@ class Scene:
 
     meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
     linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. environment: an
-    EnvironmentMap that rays see which miss everything, in place of the background. Raises InputError where a field has the wrong kind.
+    EnvironmentMap that rays see which miss everything, in place of the background. Raises InputError where a field has
+    the wrong kind.
     """
 
     meshes: tuple[Mesh, ...]

@@ -119,12 +119,14 @@ class Surface:
     @staticmethod
     def sphere(radius: float = 1.0, center: Any = (0, 0, 0)) -> "Surface":
         """A sphere; poles on z. Raises InputError unless the radius is above 0."""
-        return Surface.ellipsoid((radius, radius, radius), center)
+        return Ellipsoid(_at(center), (_positive("radius", radius),) * 3)
 
     @staticmethod
     def ellipsoid(radii: Any, center: Any = (0, 0, 0)) -> "Surface":
         """An ellipsoid with half axes `radii` (3,) along x, y and z. Raises InputError unless they are above 0."""
-        given = np.asarray(radii, np.float64) if np.shape(radii) == (3,) else np.zeros(3)
+        given = tuple(radii) if np.shape(radii) == (3,) else ()
+        if not given:
+            raise InputError(f"ellipsoid(radii={shown(radii)}): give three numbers above 0")
         return Ellipsoid(_at(center), tuple(_positive("radii", radius) for radius in given))
 
     @staticmethod

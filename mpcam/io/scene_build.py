@@ -1,6 +1,5 @@
 """The tables of a scene file turned into meshes, lights and a camera."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,9 @@ from mpcam.geometry.mesh import Material, Mesh
 from mpcam.geometry.scene import DirectionalLight, Light, PointLight, Scene
 from mpcam.io.images import read_image
 from mpcam.io.scene_camera import build_camera, default_camera
-from mpcam.io.scene_tables import DirectionalTable, MeshTable, PointTable, SceneTable
+from mpcam.io.scene_mirror import build_mirror
+from mpcam.io.scene_place import color, placement
+from mpcam.io.scene_tables import DirectionalTable, EnvironmentTable, MeshTable, PointTable, SceneTable
 from mpcam.io.scene_text import SceneText
 
 
@@ -35,9 +36,11 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         meshes,
         camera=camera,
         lights=lights,
-        ambient=_color(table.ambient, text, "ambient"),
-        background=_color(table.background, text, "background"),
+        ambient=color(table.ambient, text, "ambient"),
+        background=color(table.background, text, "background"),
         name=table.name or name,
+        mirror=None if table.mirror is None else build_mirror(table.mirror, folder, text),
+        environment=None if table.environment is None else _environment(table.environment, folder, text),
     )
 
 
@@ -47,6 +50,13 @@ def bounds_of(meshes: tuple[Mesh, ...]) -> np.ndarray:
     if not boxes:
         return np.zeros((2, 3))
     return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
+def _environment(table: EnvironmentTable, folder: Path, text: SceneText) -> Any:
+    from mpcam.effects.environment import EnvironmentMap
+
+    with text.at("environment", "image"):
+        return EnvironmentMap.from_panorama(read_image(folder / table.image)[..., :3], table.size)
 
 
 def default_light(camera: Any) -> DirectionalLight:
@@ -70,12 +80,12 @@ def _mesh(table: MeshTable, index: int, folder: Path, text: SceneText) -> Mesh:
     else:
         mesh = _builtin(table, where, text)
     with text.at(*where):
-        mesh = mesh.transformed(_placement(table, where, text))
+        mesh = mesh.transformed(placement(table.scale, table.rotate, table.translate, where, text))
     if table.color is None and table.texture is None:
         return mesh
     texture = None if table.texture is None else _texture(folder / table.texture, mesh, text, (*where, "texture"))
-    color = (1.0, 1.0, 1.0) if table.color is None else _color(table.color, text, *where, "color")
-    return replace(mesh, materials=(Material(color, texture),), face_material=None)
+    tint = (1.0, 1.0, 1.0) if table.color is None else color(table.color, text, *where, "color")
+    return replace(mesh, materials=(Material(tint, texture),), face_material=None)
 
 
 def _builtin(table: MeshTable, where: tuple[str, int], text: SceneText) -> Mesh:
@@ -85,31 +95,6 @@ def _builtin(table: MeshTable, where: tuple[str, int], text: SceneText) -> Mesh:
         raise text.error((*where, "builtin"), f"allowed are {', '.join(builtin_mesh.names)}")
     with text.at(*where, "triangles" if table.triangles else "builtin"):
         return builtin_mesh(table.builtin, triangles=table.triangles)
-
-
-def _placement(table: MeshTable, where: tuple[str, int], text: SceneText) -> np.ndarray:
-    """4x4: scale, then rotate, then translate."""
-    scale = np.broadcast_to(np.asarray(table.scale, float), 3)
-    if not np.all(scale >= 1e-30):
-        raise text.error((*where, "scale"), "give numbers above 0 (from 1e-30)")
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.diag(scale)
-    if table.rotate is not None:
-        axis = np.array(table.rotate.axis)
-        largest = np.abs(axis).max()
-        if largest == 0:
-            raise text.error((*where, "rotate", "axis"), "give a direction, e.g. [0, 0, 1]")
-        axis = axis / largest
-        matrix[:3, :3] = _rotation(axis / np.linalg.norm(axis), math.radians(table.rotate.degrees)) @ matrix[:3, :3]
-    matrix[:3, 3] = table.translate
-    return matrix
-
-
-def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    """3x3 right-handed rotation about a unit axis (Rodrigues' formula)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross)
 
 
 def _texture(path: Path, mesh: Mesh, text: SceneText, where: tuple[str | int, ...]) -> np.ndarray:
@@ -123,12 +108,5 @@ def _texture(path: Path, mesh: Mesh, text: SceneText, where: tuple[str | int, ..
 def _light(table: DirectionalTable | PointTable, index: int, text: SceneText) -> Light:
     with text.at("light", index):
         if isinstance(table, DirectionalTable):
-            return DirectionalLight(table.direction, _color(table.radiance, text, "light", index, "radiance"))
-        return PointLight(table.position, _color(table.intensity, text, "light", index, "intensity"))
-
-
-def _color(value: Any, text: SceneText, *where: str | int) -> tuple[float, float, float]:
-    red, green, blue = np.broadcast_to(np.asarray(value, float), 3)
-    if min(red, green, blue) < 0:
-        raise text.error(where, "give linear RGB numbers that are not negative")
-    return (float(red), float(green), float(blue))
+            return DirectionalLight(table.direction, color(table.radiance, text, "light", index, "radiance"))
+        return PointLight(table.position, color(table.intensity, text, "light", index, "intensity"))

@@ -40,6 +40,40 @@ class MeshTable(Table, frozen=True):
     texture: str | None = None  # an image file; replaces the materials too, and is multiplied by color
 
 
+class MirrorTable(Table, frozen=True):
+    """[mirror]: a curved mirror, or with index an interface; one of surface (exact), file or builtin (a mesh).
+
+    The keys of a surface are those of its function in mpcam.Surface, angle in degrees. Rotated, then moved.
+    """
+
+    surface: Literal["sphere", "ellipsoid", "torus", "paraboloid", "cylinder", "saddle", "wave"] | None = None
+    file: str | None = None
+    builtin: str | None = None
+    radius: Positive | None = None
+    radii: Vector | None = None
+    ring: Positive | None = None
+    tube: Positive | None = None
+    height: float | None = None
+    length: Positive | None = None
+    angle: Annotated[float, Meta(gt=0, le=360)] | None = None
+    size: Positive | None = None
+    waves: Positive | None = None
+    rotate: RotateTable | None = None
+    translate: Vector = (0.0, 0.0, 0.0)
+    scale: Scale = 1.0  # meshes only
+    index: Positive | None = None  # refractive index behind the surface over that in front; default: a mirror
+    color: Color = 1.0
+    triangles: Annotated[int, Meta(ge=1, le=100000)] = 104  # camera triangles
+    resolution: Annotated[int, Meta(ge=2, le=8192)] = 64  # pixels along the short sides of each
+
+
+class EnvironmentTable(Table, frozen=True):
+    """[environment]: a latitude-longitude picture, linear RGB, that rays see which miss everything."""
+
+    image: str
+    size: Annotated[int, Meta(ge=8, le=16384)] | None = None  # pixels along a side of the two views kept of it
+
+
 class CameraTable(Table, tag_field="model", frozen=True):
     """[camera]: keys of every model. Without a pose, the camera is put where it sees all meshes."""
 
@@ -125,16 +159,29 @@ class ResolutionsTable(Table, frozen=True):
     resolutions: Annotated[list[Annotated[int, Meta(ge=1, le=16384)]], Meta(min_length=1)]
 
 
-Method = Literal["invert", "vertex", "cubemap", "hemicube", "raytrace"]
+class TrianglesTable(Table, frozen=True):
+    triangles: Annotated[list[Annotated[int, Meta(ge=1, le=100000)]], Meta(min_length=1)]
+
+
+class SizesTable(Table, frozen=True):
+    sizes: Annotated[list[Annotated[int, Meta(ge=8, le=16384)]], Meta(min_length=1)]
+
+
+Method = Literal["invert", "vertex", "cubemap", "hemicube", "raytrace", "camera_triangles", "environment"]
 
 
 class CompareTable(Table, frozen=True):
-    """[compare]: what `mpcam compare` runs; a key that is left out is chosen there."""
+    """[compare]: what `mpcam compare` runs; a key that is left out is chosen there.
+
+    Scenes with a mirror are compared by camera_triangles, environment and raytrace, others by the rest.
+    """
 
     methods: Annotated[list[Method], Meta(min_length=1)] | None = None
     vertex: LevelsTable | None = None
     cubemap: ResolutionsTable | None = None
     hemicube: ResolutionsTable | None = None
+    camera_triangles: TrianglesTable | None = None
+    environment: SizesTable | None = None
     shading: Literal["color", "normal", "texture", "light"] | None = None
     repeats: Annotated[int, Meta(ge=1)] | None = None
 
@@ -155,5 +202,7 @@ class SceneTable(Table, frozen=True):
     light: list[DirectionalTable | PointTable] | None = None
     ambient: Color = 0.15
     background: Color = 0.0
+    mirror: MirrorTable | None = None
+    environment: EnvironmentTable | None = None
     compare: CompareTable = CompareTable()
     name: str | None = None

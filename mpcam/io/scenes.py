@@ -96,6 +96,8 @@ def _compare(table: CompareTable, text: SceneText) -> CompareSettings:
         ("vertex", "levels", "level"),
         ("cubemap", "resolutions", "resolution"),
         ("hemicube", "resolutions", "resolution"),
+        ("camera_triangles", "triangles", "triangles"),
+        ("environment", "sizes", "size"),
     ):
         values = getattr(table, method)
         if values is None:

@@ -118,7 +118,7 @@ class Bundled:
             tests, rendered = self._count(vertices, rays)
             return Stats(int(tests), int(rendered))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, rays.view)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.view)
 
     @exclusive
     def _count(self, vertices: Any, rays: "DeviceRays") -> np.ndarray:
@@ -162,6 +162,7 @@ class DeviceRays:
             dr.make_opaque(found)
             self.bundle = replace(self.bundle, planes=found)
 
+    @functools.cached_property
     @exclusive
     def view(self) -> View:
         """The rays in scene units, in world axes from the mesh's anchor."""

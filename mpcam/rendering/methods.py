@@ -119,10 +119,14 @@ def render(
     scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
     shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
-    frames of a still scene, make the maps once and give them to `shade`. explain: print to standard error which stages
-    run, which are left out and why (see `mpcam.explain`). Raises InputError.
+    frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
+    seen in it: by camera triangles with method "invert", by rays of the true surface with "raytrace", or by an
+    "environment" map; for the settings, and for many frames, see `Reflection`. explain: print to standard error which
+    stages run, which are left out and why (see `mpcam.explain`). Raises InputError.
     """
     whole = Scene.of(scene)
+    if whole.mirror is not None:
+        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings)
     if explain:
         from mpcam.rendering.explain import explain as explained
 
@@ -134,3 +138,30 @@ def render(
 
         maps = shadow_maps(whole, shadow_size, shading)
     return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading, maps)
+
+
+def _mirrored(
+    camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
+) -> np.ndarray:
+    """`render` of a scene with a mirror."""
+    from mpcam.effects.reflection import Reflection
+
+    names = {"invert": "camera_triangles", "raytrace": "raytrace", "environment": "environment"}
+    if method not in names:
+        raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
+    allowed = {"invert": ("triangles", "resolution"), "environment": ("size",)}.get(method, ())
+    for name in settings:
+        if name not in allowed:
+            raise InputError(
+                f"method={method!r} has no setting {name!r} where there is a mirror: allowed are "
+                f"{', '.join(allowed) or 'none'}"
+            )
+    maps: Any = ()
+    if shadow_size:
+        from mpcam.effects.shadows import shadow_maps
+
+        maps = shadow_maps(scene, shadow_size, shading)
+    picture = Reflection(scene, camera, method=names[method], shading=shading, shadows=maps, **settings)
+    if explain:
+        sys.stderr.write(f"{picture.explanation}\n")
+    return picture.image()

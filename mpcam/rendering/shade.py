@@ -108,7 +108,7 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequen
             f"the scene has {whole.mesh.triangle_count} triangles and the hits are on {hits.mesh.triangle_count}: "
             "give the scene that was rasterized"
         )
-    _check_shadows(shadows, whole, shading)
+    check_shadows(shadows, whole, shading)
     colour = shade_device(hits, whole, shading, shadows)
     return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
 
@@ -125,7 +125,7 @@ def check_shadow_shading(shading: str) -> None:
         raise InputError(f"shadows go with shading='light', not with {shading!r}: leave one of them out")
 
 
-def _check_shadows(shadows: Sequence[Any], scene: Scene, shading: str) -> None:
+def check_shadows(shadows: Sequence[Any], scene: Scene, shading: str) -> None:
     """See that shadow maps are those of the scene's lights."""
     if len(shadows) == 0:
         return

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
@@ -17,7 +18,7 @@ from mpcam.truth.variant import mitsuba
 
 def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
     """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
-    if not (camera.central or camera.parallel):
+    if isinstance(camera, CameraTriangles):
         from mpcam.rendering.bundled import DeviceRays
 
         return DeviceRays(camera, device).in_rows()

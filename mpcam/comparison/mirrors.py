@@ -1,0 +1,114 @@
+"""`mpcam.compare` for scenes with a mirror: camera triangles at several numbers, environment maps, and traced rays."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mpcam.comparison import metrics, timing
+from mpcam.comparison.plan import PARAMETER, Choice
+from mpcam.comparison.progress import Steps
+from mpcam.comparison.table import Row
+from mpcam.decomposition.ray_error import ray_error
+from mpcam.effects.reflection import Reflection
+from mpcam.errors import InputError
+from mpcam.geometry.scene import Scene
+
+TRIANGLES = (26, 52, 104, 208, 416, 1664)
+SIZES = (64, 256, 1024)
+METHODS = ("camera_triangles", "environment", "raytrace")
+
+
+def mirror_plan(
+    methods: Iterable[str] | None, settings: Mapping[str, Sequence[Mapping[str, Any] | float]] | None
+) -> list[Choice]:
+    """Methods and settings for a scene with a mirror; see `mpcam.compare`. Raises InputError for other names."""
+    names = (
+        list(METHODS) if methods is None else list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
+    )
+    settings = dict(settings or {})
+    for name in (*names, *settings):
+        if name not in METHODS:
+            raise InputError(f"Method {name!r} shows no mirror; the methods: {', '.join(METHODS)}.")
+    defaults: dict[str, Sequence[Any]] = {"camera_triangles": TRIANGLES, "environment": SIZES, "raytrace": ({},)}
+    choices = []
+    for name in names:
+        for entry in settings.get(name, defaults[name]):
+            if not isinstance(entry, Mapping):
+                if name not in PARAMETER:
+                    raise InputError(f"Setting {entry!r} of {name}: this method has no number to set; give {{}}.")
+                entry = {PARAMETER[name]: entry}
+            choices.append(Choice(name, dict(entry)))
+    return choices
+
+
+def mirror_rows(
+    scene: Scene,
+    camera: Any,
+    plan: list[Choice],
+    *,
+    shading: str,
+    repeats: int,
+    warmup: int,
+    moving: tuple[np.ndarray, np.ndarray] | None,
+    steps: Steps,
+) -> tuple[list[Row], dict[str, np.ndarray], np.ndarray]:
+    """Rows, their images, and the true image: rays of the true surface, traced by Mitsuba.
+
+    A frame is the whole picture here: what is beside the mirror, what is in it, both shaded. Unless the settings say
+    otherwise, the atlas has as many pixels as the camera has on the mirror.
+    """
+    true = Reflection(scene, camera, method="raytrace", shading=shading)
+    truth, pixels = true.image(), int(true.mask.sum())
+    steps.done("truth")
+    pictures: dict[str, Reflection] = {}
+    rows: dict[str, Row] = {}
+    images: dict[str, np.ndarray] = {}
+    for choice in plan:
+        started = timing.now()
+        settings = dict(choice.settings)
+        if choice.method == "camera_triangles" and "triangles" in settings and "resolution" not in settings:
+            settings["resolution"] = max(4, round(np.sqrt(2 * pixels / settings["triangles"])))
+        picture = Reflection(scene, camera, method=choice.method, shading=shading, **settings)
+        image = picture.image()
+        first = 1e3 * (timing.now() - started)
+        rmse = metrics.image_rmse(image, truth)
+        row = Row(
+            method=choice.method,
+            setting=choice.setting,
+            parameter=choice.parameter,
+            rmse=rmse,
+            psnr=metrics.psnr(rmse),
+            flip=float(metrics.flip_map(image, truth).mean()),
+            compile_ms=first,
+            note="the truth, so its errors against it are 0 by definition" if choice.method == "raytrace" else "",
+        )
+        if choice.method == "camera_triangles":
+            row = _counted(row, picture, camera)
+        pictures[choice.label], rows[choice.label], images[choice.label] = picture, row, image
+        steps.done(choice.label)
+    still = timing.measure({k: p.frame for k, p in pictures.items()}, repeats, warmup, on_call=steps.done)
+    for label, found in still.items():
+        rows[label] = replace(rows[label], still_ms=1e3 * found.median, still_spread=1e3 * found.spread)
+    if moving is not None:
+        from mpcam.comparison.driver import moving_frame
+
+        calls = {label: moving_frame(picture, moving) for label, picture in pictures.items()}
+        for label, found in timing.measure(calls, repeats, warmup, on_call=steps.done).items():
+            rows[label] = replace(rows[label], moving_ms=1e3 * found.median, moving_spread=1e3 * found.spread)
+    return list(rows.values()), images, truth
+
+
+def _counted(row: Row, picture: Reflection, camera: Any) -> Row:
+    """With the work of its rasterization and the error of its rays."""
+    cams = picture.cams
+    assert cams is not None
+    stats = picture.hits.stats
+    return replace(
+        row,
+        tests=float(stats.tests),
+        rendered=float(stats.rendered),
+        overdraw=float(stats.overdraw),
+        ray_angle=ray_error(cams, picture.mirror.surface, camera).angle_rms,
+    )

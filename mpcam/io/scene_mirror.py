@@ -1,0 +1,61 @@
+"""The [mirror] table of a scene file turned into a Mirror."""
+
+import inspect
+import math
+from pathlib import Path
+from typing import Any
+
+from mpcam.geometry.mirror import Mirror
+from mpcam.geometry.surfaces import Surface
+from mpcam.io.scene_place import color, placement
+from mpcam.io.scene_tables import MirrorTable
+from mpcam.io.scene_text import SceneText
+
+_SHAPE = ("radius", "radii", "ring", "tube", "height", "length", "angle", "size", "waves")
+
+
+def build_mirror(table: MirrorTable, folder: Path, text: SceneText) -> Mirror:
+    """The mirror that the table describes. Raises InputError, with the line of the key."""
+    kinds = [name for name in ("surface", "file", "builtin") if getattr(table, name) is not None]
+    if len(kinds) != 1:
+        raise text.error(("mirror",), "give one of surface, file (a mesh file) and builtin (a built-in mesh)")
+    place = placement(table.scale, table.rotate, table.translate, ("mirror",), text)
+    surface = _surface(table, place, text) if kinds == ["surface"] else _mesh(table, place, folder, text)
+    with text.at("mirror"):
+        return Mirror(
+            surface, table.index, color(table.color, text, "mirror", "color"), table.triangles, table.resolution
+        )
+
+
+def _surface(table: MirrorTable, place: Any, text: SceneText) -> Surface:
+    make = getattr(Surface, str(table.surface))
+    allowed = [name for name in inspect.signature(make).parameters if name != "center"]
+    given = {name: getattr(table, name) for name in _SHAPE if getattr(table, name) is not None}
+    for name in given:
+        if name not in allowed:
+            raise text.error(("mirror", name), f"a {table.surface} has no {name}: it takes {', '.join(allowed)}")
+    if table.scale != 1.0:
+        raise text.error(("mirror", "scale"), f"a surface is not scaled: give its {', '.join(allowed)}")
+    if table.surface == "ellipsoid" and "radii" not in given:
+        raise text.error(("mirror", "surface"), "an ellipsoid needs radii, e.g. [1, 0.5, 0.5]")
+    if "angle" in given:
+        given["angle"] = math.radians(given["angle"])
+    with text.at("mirror", "surface"):
+        return make(**given).transformed(place)
+
+
+def _mesh(table: MirrorTable, place: Any, folder: Path, text: SceneText) -> Any:
+    for name in _SHAPE:
+        if getattr(table, name) is not None:
+            raise text.error(("mirror", name), f"{name} goes with surface, not with a mesh: use scale")
+    if table.file is not None:
+        from mpcam.geometry.load import load_mesh
+
+        with text.at("mirror", "file"):
+            return load_mesh(folder / table.file).transformed(place)
+    from mpcam.geometry.builtin import builtin_mesh
+
+    if table.builtin not in builtin_mesh.names:
+        raise text.error(("mirror", "builtin"), f"allowed are {', '.join(builtin_mesh.names)}")
+    with text.at("mirror", "builtin"):
+        return builtin_mesh(str(table.builtin)).transformed(place)
