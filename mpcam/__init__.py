@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mpcam.cameras import Box as Box
     from mpcam.cameras import Camera as Camera
-    from mpcam.cameras import Domain as Domain
     from mpcam.cameras import CameraTriangles as CameraTriangles
+    from mpcam.cameras import Domain as Domain
     from mpcam.cameras import DoubleSphere as DoubleSphere
     from mpcam.cameras import KannalaBrandt as KannalaBrandt
     from mpcam.cameras import Orthographic as Orthographic
@@ -24,10 +24,18 @@ if TYPE_CHECKING:
     from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
+    from mpcam.decomposition.decompose import decompose as decompose
+    from mpcam.decomposition.decompose import subdivided as subdivided
+    from mpcam.decomposition.ray_error import RayError as RayError
+    from mpcam.decomposition.ray_error import ray_error as ray_error
+    from mpcam.decomposition.resolve import Resolver as Resolver
+    from mpcam.decomposition.resolve import resolve as resolve
     from mpcam.effects.environment import EnvironmentMap as EnvironmentMap
     from mpcam.effects.environment import environment_map as environment_map
     from mpcam.effects.occlusion import ambient_occlusion as ambient_occlusion
     from mpcam.effects.occlusion import form_factor as form_factor
+    from mpcam.effects.reflection import Reflection as Reflection
+    from mpcam.effects.reflection import reflection as reflection
     from mpcam.effects.shadows import ShadowMap as ShadowMap
     from mpcam.effects.shadows import shadow_map as shadow_map
     from mpcam.errors import InputError as InputError
@@ -37,9 +45,11 @@ if TYPE_CHECKING:
     from mpcam.geometry.load import load_mesh as load_mesh
     from mpcam.geometry.mesh import Material as Material
     from mpcam.geometry.mesh import Mesh as Mesh
+    from mpcam.geometry.mirror import Mirror as Mirror
     from mpcam.geometry.scene import DirectionalLight as DirectionalLight
     from mpcam.geometry.scene import PointLight as PointLight
     from mpcam.geometry.scene import Scene as Scene
+    from mpcam.geometry.surfaces import Surface as Surface
     from mpcam.io.calibration import read_calibration as read_calibration
     from mpcam.io.calibration import write_calibration as write_calibration
     from mpcam.io.images import read_camera as read_camera
@@ -64,19 +74,25 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
-        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray UnifiedOmni "
-        "custom_profile look_at"
+        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray "
+        "UnifiedOmni custom_profile look_at"
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
+    "mpcam.decomposition.decompose": "decompose subdivided",
+    "mpcam.decomposition.ray_error": "RayError ray_error",
+    "mpcam.decomposition.resolve": "Resolver resolve",
     "mpcam.effects.environment": "EnvironmentMap environment_map",
     "mpcam.effects.occlusion": "ambient_occlusion form_factor",
+    "mpcam.effects.reflection": "Reflection reflection",
     "mpcam.effects.shadows": "ShadowMap shadow_map",
     "mpcam.errors": "InputError SetupError",
     "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
     "mpcam.geometry.load": "load_mesh",
     "mpcam.geometry.mesh": "Material Mesh",
+    "mpcam.geometry.mirror": "Mirror",
     "mpcam.geometry.scene": "DirectionalLight PointLight Scene",
+    "mpcam.geometry.surfaces": "Surface",
     "mpcam.io.calibration": "read_calibration write_calibration",
     "mpcam.io.images": "read_camera read_channels read_image write_image",
     "mpcam.io.scenes": "load_scene",
@@ -88,7 +104,18 @@ _HOMES = {
     "mpcam.rendering.shade": "shade",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
-_SUBPACKAGES = ("cameras", "comparison", "effects", "geometry", "io", "math", "rendering", "stress", "truth")
+_SUBPACKAGES = (
+    "cameras",
+    "comparison",
+    "decomposition",
+    "effects",
+    "geometry",
+    "io",
+    "math",
+    "rendering",
+    "stress",
+    "truth",
+)
 
 __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 

@@ -19,20 +19,26 @@ STYLES = {
     "cubemap": ("#0a7f6b", "s"),
     "hemicube": ("#8a3fb0", "D"),
     "raytrace": ("#3c4043", "X"),
+    "camera_triangles": ("#0b62c4", "v"),
+    "environment": ("#8a3fb0", "D"),
 }
 OTHER = ("#8a6d00", "P")
 
 
-def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ("flip", "projection_median")) -> None:
+ERRORS = ("flip", "projection_median", "ray_angle")
+
+
+def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ERRORS) -> None:
     """Write a PNG with a row of log-log panels for each error, one for each time that was measured, with the front.
 
-    Errors of zero have no place on a log axis: they stand in a band marked 0 below the smallest decade.
+    Errors that no row has get no panel. Errors of zero have no place on a log axis: they stand in a band marked 0 below the smallest decade.
     """
     import matplotlib.style
 
+    known = tuple(name for name in errors if not np.isnan(comparison.column(name)).all()) or errors[:1]
     with matplotlib.style.context("default"), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")  # a name in a script that the font lacks
-        _draw(comparison, path, errors)
+        _draw(comparison, path, known)
 
 
 def _draw(comparison: "Comparison", path: Path, errors: tuple[str, ...]) -> None:

@@ -1,7 +1,7 @@
 "use strict";
 // Numbers, elements and the marks of methods: shared by the other parts of the page.
 const data = JSON.parse(document.getElementById("data").textContent);
-const METHODS = ["invert", "vertex", "cubemap", "hemicube", "raytrace"];
+const METHODS = ["invert", "vertex", "cubemap", "hemicube", "raytrace", "camera_triangles", "environment"];
 const find = (id) => document.getElementById(id);
 
 function element(name, attributes = {}, ...children) {
@@ -63,7 +63,9 @@ function shape(method, r) {
   switch (method) {
     case "invert": return `M${-r} 0A${r} ${r} 0 1 0 ${r} 0A${r} ${r} 0 1 0 ${-r} 0Z`;
     case "vertex": return `M0 ${-t}L${t} ${t * 0.8}L${-t} ${t * 0.8}Z`;
+    case "camera_triangles": return `M0 ${t}L${t} ${-t * 0.8}L${-t} ${-t * 0.8}Z`;
     case "cubemap": return `M${-s} ${-s}H${s}V${s}H${-s}Z`;
+    case "environment":
     case "hemicube": return `M0 ${-t * 1.05}L${t * 1.05} 0L0 ${t * 1.05}L${-t * 1.05} 0Z`;
     case "raytrace":
       return `M${-r} ${-r + w}L${-r + w} ${-r}L0 ${-w}L${r - w} ${-r}L${r} ${-r + w}L${w} 0L${r} ${r - w}L${r - w} ${r}` +
