@@ -74,8 +74,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
-        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection Radial Ray "
-        "UnifiedOmni custom_profile look_at"
+        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection "
+        "Radial Ray UnifiedOmni custom_profile look_at"
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",

@@ -236,6 +236,8 @@ SECTIONS = (
     ('`model = "orthographic"`', tables.OrthographicTable, tables.CameraTable),
     ('`type = "directional"`', tables.DirectionalTable, None),
     ('`type = "point"`', tables.PointTable, None),
+    ("## `[mirror]`", tables.MirrorTable, None),
+    ("## `[environment]`", tables.EnvironmentTable, None),
     ("## `[compare]`", tables.CompareTable, None),
 )
 

@@ -55,7 +55,7 @@ def coefficients(roots):
 
 
 def backward_errors(k, roots):
-    """Of each root, |p(x)| over the sum of its terms; and of the coefficients of the product of all roots."""
+    """Of each root, |p(x)| over its terms; and of the coefficients of all, over what they would be without signs."""
     with mpmath.workdps(400):
         each = []
         for root in roots:
@@ -63,7 +63,8 @@ def backward_errors(k, roots):
             size = sum(abs(t) for t in terms)
             each.append(float(abs(sum(terms)) / size) if size else 0.0)
     again = coefficients(roots) * k[0]
-    return max(each), np.max(np.abs(again - k) / np.where(k != 0, np.abs(k), np.abs(k).max()))
+    size = np.abs(coefficients([-abs(complex(root)) for root in roots]) * k[0])
+    return max(each), np.max(np.abs(again - k)[size > 0] / size[size > 0])
 
 
 CASES = {**{name: coefficients(roots) for name, roots in HARD.items()}, **COEFFICIENTS}
@@ -77,3 +78,33 @@ def test_hard_quartics(name):
     each, together = backward_errors(k, roots)
     assert each < 16 * 2.0**-52
     assert together < 64 * 2.0**-52
+
+
+@pytest.mark.parametrize("pairs", [0, 1, 2])
+@pytest.mark.parametrize("spread", [1.0, 1e6])
+def test_random_quartics(pairs, spread):
+    """Four real roots, two, none; a pair far larger than the other roots."""
+    rng = np.random.default_rng(pairs)
+    for _ in range(20):
+        roots = list(rng.uniform(-0.5, 0.5, 4 - 2 * pairs)) if pairs < 2 else []
+        for i in range(pairs):
+            z = complex(*rng.uniform(-0.5, 0.5, 2)) * (spread if i == 0 else 1.0)
+            roots += [z, z.conjugate()]
+        k = coefficients(roots) * rng.uniform(0.5, 2)
+        each, together = backward_errors(k, quartic_roots(*k))
+        assert each < 16 * 2.0**-52
+        assert together < 64 * 2.0**-52
+
+
+def test_many_at_once_and_lower_degrees():
+    k = np.random.default_rng(1).normal(size=(5, 3, 7))
+    k[0, 0, 0] = 0
+    k[:2, 1, 1] = 0
+    roots = quartic_roots(*k)
+    assert roots.shape == (3, 7, 4)
+    assert np.isinf(roots).sum() == 3
+    finite = np.where(np.isinf(roots), 0, roots)
+    left = sum(k[i][..., None] * finite ** (4 - i) for i in range(5))
+    size = sum(np.abs(k[i][..., None] * finite ** (4 - i)) for i in range(5))
+    assert (np.abs(left) < 1e-14 * size)[np.isfinite(roots)].all()
+    assert np.array_equal(quartic_roots(1, 0, 0, 0, 0), np.zeros(4))

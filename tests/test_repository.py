@@ -127,7 +127,11 @@ def test_third_party_imports_are_declared():
         ("mpcam/cameras", ("math", "errors", "cameras")),
         ("mpcam/geometry", ("math", "errors", "cameras", "geometry", "io")),
         ("mpcam/rendering", ("math", "errors", "cameras", "geometry", "rendering", "truth", "effects", "doctor")),
-        ("mpcam/effects", ("math", "errors", "cameras", "geometry", "rendering", "effects")),
+        ("mpcam/decomposition", ("math", "errors", "cameras", "geometry", "rendering", "truth", "decomposition")),
+        (
+            "mpcam/effects",
+            ("math", "errors", "cameras", "geometry", "rendering", "truth", "decomposition", "effects"),
+        ),
         ("mpcam/truth", ("math", "errors", "cameras", "geometry", "rendering", "truth", "doctor")),
     ],
 )
