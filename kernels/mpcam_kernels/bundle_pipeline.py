@@ -11,14 +11,14 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import hierarchy, pixels, planes, skew
+from mpcam_kernels import cover, hierarchy, pixels, planes, skew
 from mpcam_kernels.blocks import Large, Lists, Pairs, list_pairs
 from mpcam_kernels.bundles import Bundle, Cones, joined, room, stored
 from mpcam_kernels.frozen import frozen
 from mpcam_kernels.hierarchy import FAN, ROOM, Found
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
-from mpcam_kernels.samples import PIXELS, Samples
+from mpcam_kernels.samples import PIXELS
 
 LANES = 1 << 22  # at a time
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
@@ -27,30 +27,47 @@ CULLING = ("objects", "triangles")
 
 @dataclass(frozen=True)
 class Task:
-    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle; order: their numbers, neighbours close
-    together; counts: triangles, then clusters level by level; bundle: the rays, with so many blocks, at most `fan` of
-    them in a group.
+    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle, neighbours close together; names: the
+    triangles' own numbers; counts: triangles, then clusters level by level; bundle: the rays; fan: most blocks in a
+    group.
     """
 
     vertices: Any
     faces: Any
-    order: Any
+    names: Any
     counts: tuple[int, ...]
     bundle: Bundle
-    blocks: int
     fan: int
 
 
+@dataclass(frozen=True)
+class State:
+    """Keys of all places so far, None while nothing was drawn; tests and hits so far, or None."""
+
+    buffer: Any
+    counters: Any
+
+
+class Canvas:
+    """Holds the state while pairs are drawn that come in chunks."""
+
+    def __init__(self, state: State):
+        self.state = state
+
+
 class BundlePipeline:
-    """The kernels of one output; frozen.
+    """The kernels of one output for so many blocks; frozen.
 
     output: "hits", "depth" or "coverage". count: also count tests and hits. culling: what is left out early (Hou et al.
     2006, section 2.4): "objects" holds clusters of triangles against bundles of rays, "triangles" each triangle by
     itself; without them all pairs are looked at.
     """
 
-    def __init__(self, types: Any, *, output: str = "hits", count: bool = False, culling: tuple[str, ...] = CULLING):
-        self.types, self.output, self.count, self.culling = types, OUTPUTS[output], count, culling
+    def __init__(
+        self, types: Any, blocks: int, *, output: str = "hits", count: bool = False, culling: tuple[str, ...] = CULLING
+    ):
+        self.types, self.blocks, self.culling = types, blocks, culling
+        self.output, self.count = OUTPUTS[output], count
         self._set_up = frozen(self._set_up_pass)
         self._clusters = frozen(self._cluster_pass)
         self._first = frozen(self._first_pass)
@@ -66,43 +83,55 @@ class BundlePipeline:
         done(stage, arrays) is told after each pass.
         """
         types, tell = self.types, done or (lambda stage, arrays: None)
-        counters = dr.zeros(types.UInt64, 2) if self.count else None
-        buffer = dr.zeros(self.output.kind(types), task.blocks * PIXELS)
+        canvas = Canvas(State(None, dr.zeros(types.UInt64, 2) if self.count else None))
+        if task.counts[0]:
+            setups, levels = self._triangles(task)
+            tell("triangles", (setups, levels))
+            everywhere = lanes(types, 0, self.blocks * PIXELS // pixels.PER_LANE)
+            for pairs, rows in self.pairs(task, setups, levels, canvas, tell):
+                many = pairs.found[0]
+                tell("blocks", (pairs, canvas.state))
+                if many:
+                    lists = Lists(dr.empty(types.UInt, 2 * many), dr.prefix_sum(pairs.counts), pairs.counts)
+                    lists = self._list(lanes(types, 0, many), pairs, lists)
+                    tell("lists", lists)
+                    large, bundle = Large(rows, setups, None), task.bundle
+                    canvas.state = self._pixels(everywhere, bundle.pixels, bundle.corners, large, lists, canvas.state)
+                    tell("pixels", canvas.state)
+        buffer = self._blank() if canvas.state.buffer is None else canvas.state.buffer
+        return buffer, canvas.state.counters
+
+    def _blank(self) -> Any:
+        """Keys of places where nothing is hit."""
+        buffer = dr.zeros(self.output.kind(self.types), self.blocks * PIXELS)
         dr.make_opaque(buffer)
-        if not task.counts[0] or not task.blocks:
-            return buffer, counters
-        setups, levels = self._triangles(task)
-        tell("triangles", (setups, levels))
-        everywhere = lanes(types, 0, task.blocks * PIXELS // pixels.PER_LANE)
-        for pairs, rows in self.pairs(task, setups, levels, tell):
-            many = pairs.found[0]
-            tell("blocks", pairs)
-            if not many:
-                continue
-            lists = Lists(dr.empty(types.UInt, 2 * many), dr.prefix_sum(pairs.counts), pairs.counts)
-            lists = self._list(lanes(types, 0, many), pairs, lists)
-            tell("lists", lists)
-            buffer, counters = self._pixels(everywhere, task.bundle, Large(rows, setups, None), lists, buffer, counters)
-            tell("pixels", buffer)
-        return buffer, counters
+        return buffer
 
     def _triangles(self, task: Task) -> tuple[list[Any], list[Any]]:
         """Set-ups of the triangles, and the balls around them and, level by level, around clusters."""
         types, counts = self.types, task.counts
         rows = [dr.empty(types.Float, 4 * counts[0]) for _ in range(skew.ROWS + 1)]
-        *setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, rows)
+        *setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, task.names, rows)
         levels = [balls]
         for level, count in enumerate(counts[1:] if "objects" in self.culling else ()):
-            order, room = task.order if level == 0 else None, dr.empty(types.Float, 4 * count)
-            levels.append(self._clusters(lanes(types, 0, count), levels[-1], order, counts[level], room))
+            target = dr.empty(types.Float, 4 * count)
+            levels.append(self._clusters(lanes(types, 0, count), levels[-1], counts[level], target))
         return setups, levels
 
-    def pairs(self, task: Task, setups: list[Any], levels: list[Any], tell: Any) -> Iterator[tuple[Pairs, list[Any]]]:
-        """Pairs of a block and a triangle, in chunks, and what rows of regions they name (none here)."""
+    def pairs(
+        self, task: Task, setups: list[Any], levels: list[Any], canvas: "Canvas", tell: Any
+    ) -> Iterator[tuple[Pairs, list[Any]]]:
+        """Pairs of a block and a triangle, in chunks, and what rows of regions they name (none here).
+
+        Small triangles go onto the canvas at once.
+        """
+        rays = (task.bundle.pixels, task.bundle.cones, task.bundle.slopes)
         for found, number in self.met(task, task.bundle.groups, levels, True, tell):
             for start in range(0, number, ROOM):
                 lane = lanes(self.types, start, min(number, start + ROOM))
-                yield self._blocks(lane, task.bundle, setups, found, dr.zeros(self.types.UInt, task.blocks)), []
+                zeros = dr.zeros(self.types.UInt, self.blocks)
+                pairs, canvas.state = self._blocks(lane, rays, setups, found, zeros, canvas.state)
+                yield pairs, []
 
     def met(self, task: Task, cones: Cones, levels: list[Any], split: bool, tell: Any) -> Iterator[tuple[Found, int]]:
         """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
@@ -111,6 +140,7 @@ class BundlePipeline:
         """
         types, top = self.types, len(levels) - 1
         bundles = dr.width(cones.rows[0]) // 4
+        blocks = (task.bundle.cones, task.bundle.first, task.bundle.count)
 
         def passed(fan: int, number: int, step: Callable[[Any], Found]) -> Iterator[tuple[Found, int]]:
             """A step over all pairs, a lane for each of their `fan` children, in chunks that there is room for."""
@@ -134,16 +164,14 @@ class BundlePipeline:
             if groups and (level == 0 or FAN**level <= GROUPED):
                 balls, cull = levels[level], self._culls(level)
                 for after in passed(
-                    task.fan, number, lambda lane: self._groups(lane, task.fan, task.bundle, balls, found, cull)
+                    task.fan, number, lambda lane: self._groups(lane, task.fan, blocks, balls, found, cull)
                 ):
                     yield from down(level, False, *after)
                 return
             around = task.bundle.groups if groups else task.bundle.cones if split else cones
-            order, below, count = task.order if level == 1 else None, levels[level - 1], task.counts[level - 1]
+            below, count = levels[level - 1], task.counts[level - 1]
             cull = self._culls(level - 1)
-            for after in passed(
-                FAN, number, lambda lane: self._children(lane, around, below, count, found, order, cull)
-            ):
+            for after in passed(FAN, number, lambda lane: self._children(lane, around, below, count, found, cull)):
                 yield from down(level - 1, groups, *after)
 
         count, cull = task.counts[top], self._culls(top)
@@ -153,59 +181,63 @@ class BundlePipeline:
     def _culls(self, level: int) -> bool:
         return "triangles" in self.culling if level == 0 else True
 
-    def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, rows: list[Any]) -> list[Any]:
+    def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, rows: list[Any]) -> list[Any]:
         types = self.types
         corners = dr.gather(types.Array3u, faces, triangle)
         a, b, c = (dr.gather(types.Array3f, vertices, corner) for corner in corners)
         shape = skew.setup(a, b, c)
         ball = hierarchy.triangle_balls(types, (a, b, c), shape.usable)
-        for target, row in zip(rows, (*skew.pack(types, shape), ball), strict=True):
+        for target, row in zip(
+            rows, (*skew.pack(types, shape, dr.gather(types.UInt, names, triangle)), ball), strict=True
+        ):
             dr.scatter(target, row, triangle)
         return rows
 
-    def _cluster_pass(self, cluster: Any, balls: Any, order: Any, count: int, room: Any) -> Any:
-        dr.scatter(room, hierarchy.cluster_balls(self.types, cluster, balls, order, count), cluster)
-        return room
+    def _cluster_pass(self, cluster: Any, balls: Any, count: int, target: Any) -> Any:
+        dr.scatter(target, hierarchy.cluster_balls(self.types, cluster, balls, count), cluster)
+        return target
 
     def _first_pass(self, lane: Any, cones: Any, balls: Any, clusters: int, cull: bool) -> Found:
         return hierarchy.first_pairs(self.types, lane, cones, balls, clusters, cull)
 
-    def _group_pass(self, lane: Any, fan: int, bundle: Bundle, balls: Any, before: Found, cull: bool) -> Found:
-        return hierarchy.refine_groups(self.types, lane, fan, bundle, balls, before, cull)
+    def _group_pass(self, lane: Any, fan: int, blocks: Any, balls: Any, before: Found, cull: bool) -> Found:
+        return hierarchy.refine_groups(self.types, lane, fan, *blocks, balls, before, cull)
 
-    def _child_pass(
-        self, lane: Any, cones: Any, balls: Any, count: int, before: Found, order: Any, cull: bool
-    ) -> Found:
-        return hierarchy.refine_clusters(self.types, lane, cones, balls, count, before, order, cull)
+    def _child_pass(self, lane: Any, cones: Any, balls: Any, count: int, before: Found, cull: bool) -> Found:
+        return hierarchy.refine_clusters(self.types, lane, cones, balls, count, before, cull)
 
-    def _block_pass(self, lane: Any, bundle: Bundle, setups: list[Any], before: Found, counts: Any) -> Pairs:
-        return hierarchy.block_pairs(self.types, skew, lane, bundle, setups, before, counts)
+    def _block_pass(
+        self, lane: Any, rays: Any, setups: list[Any], before: Found, counts: Any, state: "State"
+    ) -> tuple[Pairs, "State"]:
+        buffer = self._blank() if state.buffer is None else state.buffer
+        pairs, *counted = cover.block_pairs(
+            self.types, skew, self.output, lane, *rays, setups, before, counts, buffer, self.count
+        )
+        return pairs, State(buffer, self._counted(state.counters, counted))
+
+    def _counted(self, counters: Any, counted: list[Any]) -> Any:
+        """The counters with tests and hits of all lanes added."""
+        if self.count:
+            for slot, value in enumerate(counted):
+                dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(value), self.types.UInt(slot))
+        return counters
 
     def _list_pass(self, lane: Any, pairs: Pairs, lists: Lists) -> Lists:
         return list_pairs(self.types, lane, pairs, lists)
 
-    def _pixel_pass(
-        self, lane: Any, bundle: Bundle, large: Large, lists: Lists, buffer: Any, counters: Any
-    ) -> tuple[Any, Any]:
-        samples = Samples(bundle.pixels, None, None)  # pyright: ignore[reportArgumentType]
-        corner = self._corner(bundle)
-        keys, *counted = pixels.through_lists(
-            self.types, skew, self.output, lane, samples, large, lists, buffer, corner, bool(large.regions), self.count
-        )
-        if self.count:
-            for slot, value in enumerate(counted):
-                dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(value), self.types.UInt(slot))
-        return keys, counters
+    def _pixel_pass(self, lane: Any, rays: Any, corners: Any, large: Large, lists: Lists, state: "State") -> "State":
+        buffer = self._blank() if state.buffer is None else state.buffer
 
-    def _corner(self, bundle: Bundle) -> Callable[[Any], tuple[Any, Any]]:
-        """A function from places to their column and row within their camera triangle."""
-
-        def at(place: Any) -> tuple[Any, Any]:
+        def corner(place: Any) -> tuple[Any, Any]:
+            """Column and row of places within their camera triangle."""
             block = place // PIXELS
-            x, y = (dr.gather(self.types.UInt, values, block) for values in bundle.corners)
+            x, y = (dr.gather(self.types.UInt, values, block) for values in corners)
             return x + ((place >> 4) & 3) * 4 + (place & 3), y + ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
 
-        return at
+        keys, *counted = pixels.through_lists(
+            self.types, skew, self.output, lane, rays, large, lists, buffer, corner, bool(large.regions), self.count
+        )
+        return State(keys, self._counted(state.counters, counted))
 
 
 class PlanePipeline(BundlePipeline):
@@ -215,14 +247,16 @@ class PlanePipeline(BundlePipeline):
     with "triangles", regions that hold no pixel of the camera triangle are dropped before anything else is done.
     """
 
-    def __init__(self, types: Any, bound: str, **settings: Any):
-        super().__init__(types, **settings)
+    def __init__(self, types: Any, blocks: int, bound: str, **settings: Any):
+        super().__init__(types, blocks, **settings)
         self.bound = bound
         self._around = frozen(self._around_pass)
         self._items = frozen(self._item_pass)
         self._item_blocks = frozen(self._item_block_pass)
 
-    def pairs(self, task: Task, setups: list[Any], levels: list[Any], tell: Any) -> Iterator[tuple[Pairs, list[Any]]]:
+    def pairs(
+        self, task: Task, setups: list[Any], levels: list[Any], canvas: "Canvas", tell: Any
+    ) -> Iterator[tuple[Pairs, list[Any]]]:
         """Pairs of a block and an item, in chunks, and the items' rows."""
         types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
         faces = lanes(types, 0, dr.width(found_planes.first))
@@ -238,7 +272,7 @@ class PlanePipeline(BundlePipeline):
             while start < many:
                 step = min(step, many - start)
                 lane = lanes(types, start * fan, (start + step) * fan)
-                zeros = dr.zeros(types.UInt, task.blocks)
+                zeros = dr.zeros(types.UInt, self.blocks)
                 pairs = self._item_blocks(lane, fan, found_planes, items, bundle.corners, zeros)
                 if pairs.found[0] > ROOM and step > 1:
                     step = max(1, step // (1 + pairs.found[0] // ROOM))

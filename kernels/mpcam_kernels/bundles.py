@@ -67,11 +67,6 @@ def may_meet(cone: tuple[Any, Any], ball: Any) -> Any:
     return possible & (first.w >= 0) & (ball.w >= 0)
 
 
-def gathered(pixels: Rays, types: Any, number: Any, active: Any = True) -> Rays:
-    """Rays by place."""
-    return Rays(*(dr.gather(types.Float, values, number, active) for values in pixels))
-
-
 def room(types: Any, rows: int, count: int) -> list[Any]:
     """Arrays for rows of four numbers; frozen functions need them from outside, where their length may change."""
     return [dr.empty(types.Float, 4 * count) for _ in range(rows)]
@@ -95,9 +90,7 @@ def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
     start = block * PIXELS
 
     def sample(k: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-        ray = gathered(pixels, types, start + k)
-        d = types.Array3f(ray.dx, ray.dy, ray.dz)
-        m, o = types.Array3f(ray.mx, ray.my, ray.mz), types.Array3f(ray.ox, ray.oy, ray.oz)
+        d, m, o = pixels.at(types, start + k)
         s, t = position(types, k)
         return d, m, o, s, t, dr.squared_norm(d) > 0
 

@@ -20,7 +20,7 @@ from mpcam_kernels.frozen import frozen
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.regions import Outline, region
-from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of
+from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of, place
 from mpcam_kernels.samples import blocks as blocks_of
 
 SMALL = 96  # pixels in a region that one lane walks by itself
@@ -172,7 +172,7 @@ class Pipeline:
                     usable = seen & shape.usable
                     small = usable & (area.pixels <= self.small)
                     more = walk.walk(
-                        types, test, self.output, shape, triangle, area, small, samples, self.width, buffer, self.count
+                        types, test, self.output, shape, triangle, area, small, samples, self._place, buffer, self.count
                     )
                     blocks.append(types, test, area, shape, triangle, usable & ~small, large)
                     return tests + more[0], hits + more[1]
@@ -183,6 +183,9 @@ class Pipeline:
         none = (types.UInt(0), types.UInt(0))
         counted = dr.if_stmt(none, shown, outlined, lambda tests, hits: (tests, hits))
         return buffer, large, self._counted(counters, *counted)
+
+    def _place(self, x: Any, y: Any) -> Any:
+        return place(x, y, self.width)
 
     def _find_pass(self, lanes: Any, per_item: int, samples: Samples, large: blocks.Large) -> blocks.Squares:
         most = self.pairs // blocks.BLOCKS

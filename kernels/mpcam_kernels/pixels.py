@@ -9,7 +9,7 @@ import drjit as dr
 
 from mpcam_kernels import regions
 from mpcam_kernels.blocks import Large, Lists, set_up
-from mpcam_kernels.samples import PARTS, PIXELS, Samples
+from mpcam_kernels.samples import PARTS, PIXELS
 
 PER_LANE = 8  # pixels of a lane, two rows of a part: a set-up that is gathered serves eight tests in registers
 FOURS = PER_LANE // 4
@@ -20,7 +20,7 @@ def through_lists(
     test: Any,
     output: Any,
     lane: Any,
-    samples: Samples,
+    samples: Any,
     large: Large,
     lists: Lists,
     buffer: Any,
@@ -38,8 +38,7 @@ def through_lists(
     block, part = place // PIXELS, (place >> 4) % PARTS
     four = types.Array4u64 if output.kind(types) is types.UInt64 else types.Array4u
     fours = [lane * FOURS + k for k in range(FOURS)]
-    groups = [[dr.gather(types.Array4f, component, at) for component in samples.pixels] for at in fours]
-    views = [type(samples.pixels)(*(component[k] for component in group)) for group in groups for k in range(4)]
+    views = samples.run(types, place, PER_LANE)
     before = [key for at in fours for key in dr.gather(four, buffer, at)]
     x, y = corner(place) if bounded else (place, place)
     start = dr.gather(types.UInt, lists.starts, block)
@@ -74,6 +73,7 @@ def through_lists(
         if bounded:
             triangle = dr.reinterpret_array(types.UInt, dr.gather(types.Float, large.regions[2], name * 4 + 3))
         shape = set_up(types, test, large, triangle)
+        triangle = getattr(shape, "name", triangle)  # set-ups may lie in another order than triangles
         nearest, first = [], []
         for k, possible in enumerate(allowed(name, mask)):
             if output.depth:

@@ -29,6 +29,16 @@ class Samples:
     coarse: "Bounds"
     parts: "Bounds"
 
+    def at(self, types: Any, place: Any, active: Any = True) -> Any:
+        """Samples by place."""
+        return dr.gather(type(self.pixels), self.pixels, place, active)
+
+    def run(self, types: Any, first: Any, count: int) -> list[Any]:
+        """Samples of `count` places, a multiple of four, from a multiple of four on."""
+        fours = [first // 4 + k for k in range(count // 4)]
+        groups = [[dr.gather(types.Array4f, component, at) for component in self.pixels] for at in fours]
+        return [type(self.pixels)(*(component[k] for component in group)) for group in groups for k in range(4)]
+
 
 @dataclass(frozen=True)
 class Bounds:

@@ -13,31 +13,47 @@ Float = Any
 Vector = Any
 
 
+class Ray(NamedTuple):
+    """Unit direction, moment (origin x direction) and origin; all zero where there is no ray."""
+
+    direction: Vector
+    moment: Vector
+    origin: Vector
+
+
 @dataclass(frozen=True)
 class Rays:
-    """Unit directions, moments (origin x direction) and origins, number by number; all zero where there is no ray."""
+    """Rays in memory, four numbers each: direction and how far the origin lies along it; moment, and 0."""
 
-    dx: Any
-    dy: Any
-    dz: Any
-    mx: Any
-    my: Any
-    mz: Any
-    ox: Any
-    oy: Any
-    oz: Any
+    directions: Any
+    moments: Any
 
-    def __iter__(self) -> Any:
-        return iter((self.dx, self.dy, self.dz, self.mx, self.my, self.mz, self.ox, self.oy, self.oz))
+    def at(self, types: Any, number: Any, active: Any = True) -> Ray:
+        """Rays by number. The origin is direction x moment, the point nearest to (0, 0, 0), plus its part along."""
+        first = dr.gather(types.Array4f, self.directions, number, active)
+        moment = dr.gather(types.Array4f, self.moments, number, active).xyz
+        direction = first.xyz
+        return Ray(direction, moment, dr.fma(direction, first.w, dr.cross(direction, moment)))
+
+    def run(self, types: Any, first: Any, count: int) -> list[Ray]:
+        """So many rays from a number on."""
+        return [self.at(types, first + k) for k in range(count)]
+
+
+def packed(types: Any, direction: Vector, origin: Vector) -> list[Any]:
+    """The rows in which rays are kept."""
+    along = dr.dot(direction, origin)
+    return [types.Array4f(*direction, along), types.Array4f(*dr.cross(origin, direction), 0)]
 
 
 class SkewTriangle(NamedTuple):
-    """Per edge a x b and b - a; the normal, not of unit length, and its inner product with a corner."""
+    """Per edge a x b and b - a; the normal, not of unit length, its inner product with a corner, and the number."""
 
     edges: tuple[tuple[Vector, Vector], ...]
     normal: Vector
     offset: Float
     usable: Any
+    name: Any = None
 
 
 def _edge(p: Vector, q: Vector) -> tuple[Vector, Vector]:
@@ -58,37 +74,33 @@ def setup(a: Vector, b: Vector, c: Vector) -> SkewTriangle:
     )
 
 
-def _sides(triangle: SkewTriangle, ray: Any) -> list[Float]:
+def _sides(triangle: SkewTriangle, ray: Ray) -> list[Float]:
+    d, m = ray.direction, ray.moment
     return [
-        dr.fma(
-            ray.dx,
-            n.x,
-            dr.fma(ray.dy, n.y, dr.fma(ray.dz, n.z, dr.fma(ray.mx, e.x, dr.fma(ray.my, e.y, ray.mz * e.z)))),
-        )
+        dr.fma(d.x, n.x, dr.fma(d.y, n.y, dr.fma(d.z, n.z, dr.fma(m.x, e.x, dr.fma(m.y, e.y, m.z * e.z)))))
         for n, e in triangle.edges
     ]
 
 
-def hit(triangle: SkewTriangle, ray: Any) -> tuple[Any, Float]:
+def hit(triangle: SkewTriangle, ray: Ray) -> tuple[Any, Float]:
     """Whether lines run between the three edges, and the inverse of the distance along the ray.
 
     Rays hit where both hold: between the edges, and an inverse distance above zero.
     """
-    sides, n = _sides(triangle, ray), triangle.normal
-    lowest, highest = dr.minimum(dr.minimum(*sides[:2]), sides[2]), dr.maximum(dr.maximum(*sides[:2]), sides[2])
-    away = triangle.offset - dr.fma(ray.ox, n.x, dr.fma(ray.oy, n.y, ray.oz * n.z))
-    towards = dr.fma(ray.dx, n.x, dr.fma(ray.dy, n.y, ray.dz * n.z))
+    a, b, c = _sides(triangle, ray)
+    lowest, highest = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
+    away = triangle.offset - dr.dot(ray.origin, triangle.normal)
     # A ray that starts in the triangle's plane is at no distance from it: no hit, as for a tracer.
-    return ((lowest >= 0) | (highest <= 0)) & (away != 0), towards / away
+    return ((lowest >= 0) | (highest <= 0)) & (away != 0), dr.dot(ray.direction, triangle.normal) / away
 
 
-def inside(triangle: SkewTriangle, ray: Any) -> Any:
+def inside(triangle: SkewTriangle, ray: Ray) -> Any:
     """Whether rays hit."""
     covered, nearness = hit(triangle, ray)
     return covered & (nearness > 0)
 
 
-def weights(triangle: SkewTriangle, ray: Any) -> tuple[Float, Float]:
+def weights(triangle: SkewTriangle, ray: Ray) -> tuple[Float, Float]:
     """Barycentric weights of corners b and c at the point that a ray hits."""
     e0, e1, e2 = _sides(triangle, ray)
     scale = 1.0 / (e0 + e1 + e2)
@@ -98,19 +110,18 @@ def weights(triangle: SkewTriangle, ray: Any) -> tuple[Float, Float]:
 ROWS = 6  # rows of four numbers that a set-up packs into
 
 
-def pack(types: Any, triangle: SkewTriangle) -> list[Any]:
-    """The set-up in rows of four numbers."""
+def pack(types: Any, triangle: SkewTriangle, name: Any) -> list[Any]:
+    """The set-up and the number of the triangle, in rows of four numbers."""
     (n0, e0), (n1, e1), (n2, e2) = triangle.edges
-    rows = [(*n0, triangle.offset), (*e0, e2.x), (*n1, e2.y), (*e1, e2.z), (*n2, 0.0), (*triangle.normal, 0.0)]
+    number = dr.reinterpret_array(types.Float, types.UInt(name))
+    rows = [(*n0, triangle.offset), (*e0, e2.x), (*n1, e2.y), (*e1, e2.z), (*n2, number), (*triangle.normal, 0.0)]
     return [types.Array4f(*row) for row in rows]
 
 
 def unpack(rows: list[Any]) -> SkewTriangle:
     """The set-up of a usable triangle from its rows."""
-    kind = type(rows[0].xyz)
-    edges = (
-        (rows[0].xyz, rows[1].xyz),
-        (rows[2].xyz, rows[3].xyz),
-        (rows[4].xyz, kind(rows[1].w, rows[2].w, rows[3].w)),
-    )
-    return SkewTriangle(edges, rows[5].xyz, rows[0].w, True)
+    first, second, third, fourth, fifth, last = rows
+    e2 = type(first.xyz)(second.w, third.w, fourth.w)
+    edges = ((first.xyz, second.xyz), (third.xyz, fourth.xyz), (fifth.xyz, e2))
+    name = dr.reinterpret_array(dr.uint32_array_t(type(fifth.w)), fifth.w)
+    return SkewTriangle(edges, last.xyz, first.w, True, name)

@@ -1,11 +1,11 @@
 """Small triangles: a lane walks the pixels of a region row by row; the nearest surface wins by an atomic maximum."""
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
 
 from mpcam_kernels.regions import Region
-from mpcam_kernels.samples import Samples, place
 
 
 def walk(
@@ -16,19 +16,22 @@ def walk(
     triangle: Any,
     area: Region,
     active: Any,
-    samples: Samples,
-    width: int,
+    samples: Any,
+    place: Callable[[Any, Any], Any],
     buffer: Any,
     count: bool,
 ) -> tuple[Any, Any]:
-    """Raise `buffer` to the triangle's keys at the pixels that it covers; returns tests and hits of each lane."""
+    """Raise `buffer` to the triangle's keys at the pixels that it covers; returns tests and hits of each lane.
+
+    place: of a column and a row of the region.
+    """
 
     spans = area.spans(types)
 
     def body(x: Any, end: Any, y: Any, tests: Any, hits: Any) -> Any:
-        pixel = place(types.UInt(x), types.UInt(y), width)
+        pixel = place(types.UInt(x), types.UInt(y))
         within = x < end
-        sample = dr.gather(type(samples.pixels), samples.pixels, pixel, within)
+        sample = samples.at(types, pixel, within)
         if output.depth:
             covered, nearness = test.hit(shape, sample)
             covered = covered & within & (nearness > 0)

@@ -14,7 +14,7 @@ from mpcam.cameras.types import Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
-from mpcam.math import cross, normalize
+from mpcam.math import normalize
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
@@ -78,9 +78,9 @@ class Bundled:
         from mpcam_kernels.backend import backend_name
         from mpcam_kernels.bundle_pipeline import Task
 
-        rays, (order, counts) = self.rays, self.tree
+        rays, (names, faces, counts) = self.rays, self.tree
         kernels = _pipeline(self.bound, self.output, self.culling, rays.layout.blocks, count, backend_name())
-        task = Task(self.vertices, self.faces, order, counts, rays.bundle, rays.layout.blocks, rays.fan)
+        task = Task(self.vertices, faces, names, counts, rays.bundle, rays.fan)
         return kernels.frame(task, done)
 
     @exclusive
@@ -182,8 +182,7 @@ class DeviceRays:
         t, pixels = types(), self.bundle.pixels
         valid = self.place >= 0
         number = t.UInt(dr.maximum(self.place, 0))
-        ray = [dr.gather(t.Float, values, number) for values in pixels]
-        direction, origin = t.Array3f(*ray[:3]), t.Array3f(*ray[6:])
+        direction, _, origin = pixels.at(t, number)
         valid = valid & (dr.squared_norm(direction) > 0)
         return origin, dr.select(valid, direction, t.Array3f(0, 0, 1)), valid
 
@@ -244,10 +243,10 @@ def _frozen_rays(kind: str) -> Any:
     from mpcam_kernels.bundles import Bundle, Cones, bounds, joined, room, stored
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.samples import PIXELS
-    from mpcam_kernels.skew import Rays
+    from mpcam_kernels.skew import Rays, packed
 
     @frozen
-    def rays(place: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Rays:
+    def rays(place: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any], targets: list[Any]) -> Rays:
         t = types()
         block = place // PIXELS
         face, side = dr.gather(t.UInt, fixed["face"], block), dr.gather(t.UInt, fixed["side"], block)
@@ -265,7 +264,7 @@ def _frozen_rays(kind: str) -> Any:
         direction = normalize(direction)
         valid = valid & (x + y < side) & dr.isfinite(direction.x + direction.y + direction.z)
         direction, origin = dr.select(valid, direction, 0), dr.select(valid, origin, 0)
-        return Rays(*direction, *cross(origin, direction), *origin)
+        return Rays(*stored(packed(t, direction, origin), place, targets))
 
     @frozen
     def bound(block: Any, pixels: Rays, targets: list[Any]) -> list[Any]:
@@ -277,7 +276,7 @@ def _frozen_rays(kind: str) -> Any:
 
     def bundle(places: Any, block: Any, groups: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Bundle:
         used = {name: fixed[name] for name in ("face", "side", "x", "y")}
-        pixels = rays(places, used, rows, bent)
+        pixels = rays(places, used, rows, bent, room(types(), 2, dr.width(places)))
         first, second, *slopes = bound(block, pixels, room(types(), 8, dr.width(block)))
         cones = Cones([first, second])
         around = group(groups, cones, fixed["first"], fixed["count"], room(types(), 2, dr.width(groups)))
@@ -296,8 +295,8 @@ def _bender(kind: str, bent: dict[str, Any]) -> CameraTriangles:
     return camera
 
 
-def _tree(mesh: Mesh) -> tuple[Any, tuple[int, ...]]:
-    """The triangles in an order that puts neighbours together, and the sizes of the levels of clusters above."""
+def _tree(mesh: Mesh) -> tuple[Any, Any, tuple[int, ...]]:
+    """Numbers and corners of the triangles, neighbours together, and the sizes of the levels of clusters above."""
     from mpcam_kernels.hierarchy import FAN
 
     with np.errstate(invalid="ignore", over="ignore"):
@@ -305,7 +304,8 @@ def _tree(mesh: Mesh) -> tuple[Any, tuple[int, ...]]:
     counts = [mesh.triangle_count]
     while counts[-1] > FEW and len(counts) < 5:
         counts.append(-(-counts[-1] // FAN))
-    return types().UInt(order.astype(np.uint32)), tuple(counts)
+    faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
+    return types().UInt(order.astype(np.uint32)), types().UInt(faces), tuple(counts)
 
 
 @functools.lru_cache(maxsize=32)
@@ -314,7 +314,9 @@ def _pipeline(bound: str, output: str, culling: tuple[str, ...], blocks: int, co
     from mpcam_kernels.bundle_pipeline import BundlePipeline, PlanePipeline
 
     settings: dict[str, Any] = {"output": output, "count": count, "culling": culling}
-    return BundlePipeline(types(), **settings) if bound == "tight" else PlanePipeline(types(), bound, **settings)
+    if bound == "tight":
+        return BundlePipeline(types(), blocks, **settings)
+    return PlanePipeline(types(), blocks, bound, **settings)
 
 
 @functools.cache
@@ -345,13 +347,12 @@ def _frozen_weights() -> Any:
     import drjit as dr
 
     from mpcam_kernels import decode, skew
-    from mpcam_kernels.bundles import gathered
     from mpcam_kernels.frozen import frozen
 
     @frozen
     def weights(place: Any, triangle: Any, vertices: Any, faces: Any, pixels: Any) -> tuple[Any, Any]:
         t = types()
-        views = gathered(pixels, t, t.UInt(dr.maximum(place, 0)), place >= 0)
+        views = pixels.at(t, t.UInt(dr.maximum(place, 0)), place >= 0)
         return decode.weights(t, skew, vertices, faces, triangle, views, t.Array3f)
 
     return weights

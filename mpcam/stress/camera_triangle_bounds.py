@@ -97,12 +97,13 @@ def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:
     t = types()
     prepared = Bundled(camera, mesh)
     rays, vertices, faces = prepared.rays.bundle.pixels, prepared.vertices, prepared.faces
-    place = dr.arange(t.UInt, dr.width(rays.dx))
+    place = dr.arange(t.UInt, dr.width(rays.moments) // 4)
+    each = rays.at(t, place)
 
     def step(number: object, hits: object) -> tuple[object, object]:
         corners = [dr.gather(t.UInt, faces, number * 3 + k) for k in range(3)]
         shape = skew.setup(*(dr.gather(t.Array3f, vertices, corner) for corner in corners))
-        covered = skew.inside(shape, rays) & shape.usable
+        covered = skew.inside(shape, each) & shape.usable
         return number + 1, hits + dr.select(covered, t.UInt(1), 0)
 
     count = mesh.triangle_count
