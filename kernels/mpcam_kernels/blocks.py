@@ -10,6 +10,7 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
+from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import COARSE, HEIGHT, PART, PARTS, WIDTH, Samples
 
 LANES_WANTED = 1 << 14  # the rows of a triangle's squares are shared among lanes until there are about so many
@@ -19,10 +20,13 @@ BLOCKS = COARSE // HEIGHT  # in a coarse square, above each other
 
 @dataclass(frozen=True)
 class Large:
-    """Large triangles: per item the region and the triangle's number (see `regions.pack`), per triangle the set-up."""
+    """Large triangles: per item the region and the triangle's number (see `regions.pack`), per triangle the set-up.
+
+    setups: an array for each of its rows, or `Rows`.
+    """
 
     regions: list[Any]
-    setups: list[Any]
+    setups: Any
     count: Any
 
 
@@ -70,6 +74,8 @@ def append(types: Any, test: Any, area: regions.Region, shape: Any, triangle: An
 
 def set_up(types: Any, test: Any, large: Large, triangle: Any) -> Any:
     """The set-up of triangles by number."""
+    if isinstance(large.setups, Rows):
+        return test.unpack(large.setups.at(types, triangle))
     return test.unpack([dr.gather(types.Array4f, row, triangle) for row in large.setups])
 
 

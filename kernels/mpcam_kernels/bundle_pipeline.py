@@ -13,14 +13,16 @@ import drjit as dr
 
 from mpcam_kernels import cover, hierarchy, pixels, planes, skew
 from mpcam_kernels.blocks import Large, Lists, Pairs, list_pairs
-from mpcam_kernels.bundles import Bundle, Cones, joined, room, stored
+from mpcam_kernels.bundles import Bundle, Cones, joined
 from mpcam_kernels.frozen import frozen
-from mpcam_kernels.hierarchy import FAN, ROOM, Found
+from mpcam_kernels.hierarchy import FAN, ROOM, SHARE, Found
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
+from mpcam_kernels.rows import Rows, room
 from mpcam_kernels.samples import PIXELS
 
 LANES = 1 << 22  # at a time
+MANY = 1024  # triangles, from which on some may be small
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
 CULLING = ("objects", "triangles")
 
@@ -74,6 +76,7 @@ class BundlePipeline:
         self._groups = frozen(self._group_pass)
         self._children = frozen(self._child_pass)
         self._blocks = frozen(self._block_pass)
+        self._walk = frozen(self._walk_pass)
         self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
 
@@ -107,39 +110,43 @@ class BundlePipeline:
         dr.make_opaque(buffer)
         return buffer
 
-    def _triangles(self, task: Task) -> tuple[list[Any], list[Any]]:
+    def _triangles(self, task: Task) -> tuple[Rows, list[Rows]]:
         """Set-ups of the triangles, and the balls around them and, level by level, around clusters."""
         types, counts = self.types, task.counts
-        rows = [dr.empty(types.Float, 4 * counts[0]) for _ in range(skew.ROWS + 1)]
-        *setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, task.names, rows)
+        targets = room(types, skew.ROWS, counts[0]), room(types, 1, counts[0])
+        setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, task.names, targets)
         levels = [balls]
         for level, count in enumerate(counts[1:] if "objects" in self.culling else ()):
-            target = dr.empty(types.Float, 4 * count)
+            target = room(types, 1, count)
             levels.append(self._clusters(lanes(types, 0, count), levels[-1], counts[level], target))
         return setups, levels
 
     def pairs(
-        self, task: Task, setups: list[Any], levels: list[Any], canvas: "Canvas", tell: Any
+        self, task: Task, setups: Rows, levels: list[Rows], canvas: "Canvas", tell: Any
     ) -> Iterator[tuple[Pairs, list[Any]]]:
         """Pairs of a block and a triangle, in chunks, and what rows of regions they name (none here).
 
         Small triangles go onto the canvas at once.
         """
-        rays = (task.bundle.pixels, task.bundle.cones, task.bundle.slopes)
+        bounds, walking = (task.bundle.cones, task.bundle.slopes), task.counts[0] > MANY
         for found, number in self.met(task, task.bundle.groups, levels, True, tell):
             for start in range(0, number, ROOM):
                 lane = lanes(self.types, start, min(number, start + ROOM))
                 zeros = dr.zeros(self.types.UInt, self.blocks)
-                pairs, canvas.state = self._blocks(lane, rays, setups, found, zeros, canvas.state)
+                pairs, few = self._blocks(lane, bounds, setups, found, zeros, walking)
+                many = few.found[0] if few else 0
+                if many:
+                    canvas.state = self._walk(lanes(self.types, 0, many), task.bundle.pixels, setups, few, canvas.state)
+                    tell("small", canvas.state)
                 yield pairs, []
 
-    def met(self, task: Task, cones: Cones, levels: list[Any], split: bool, tell: Any) -> Iterator[tuple[Found, int]]:
+    def met(self, task: Task, cones: Cones, levels: list[Rows], split: bool, tell: Any) -> Iterator[tuple[Found, int]]:
         """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
 
         cones: of the bundles to begin with; split: they are groups, and blocks take their place on the way down.
         """
         types, top = self.types, len(levels) - 1
-        bundles = dr.width(cones.rows[0]) // 4
+        bundles = dr.width(cones.rows.flat) // (4 * cones.rows.count)
         blocks = (task.bundle.cones, task.bundle.first, task.bundle.count)
 
         def passed(fan: int, number: int, step: Callable[[Any], Found]) -> Iterator[tuple[Found, int]]:
@@ -171,7 +178,7 @@ class BundlePipeline:
             around = task.bundle.groups if groups else task.bundle.cones if split else cones
             below, count = levels[level - 1], task.counts[level - 1]
             cull = self._culls(level - 1)
-            for after in passed(FAN, number, lambda lane: self._children(lane, around, below, count, found, cull)):
+            for after in passed(SHARE, number, lambda lane: self._children(lane, around, below, count, found, cull)):
                 yield from down(level - 1, groups, *after)
 
         count, cull = task.counts[top], self._culls(top)
@@ -181,20 +188,19 @@ class BundlePipeline:
     def _culls(self, level: int) -> bool:
         return "triangles" in self.culling if level == 0 else True
 
-    def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, rows: list[Any]) -> list[Any]:
+    def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, targets: Any) -> Any:
         types = self.types
         corners = dr.gather(types.Array3u, faces, triangle)
         a, b, c = (dr.gather(types.Array3f, vertices, corner) for corner in corners)
         shape = skew.setup(a, b, c)
         ball = hierarchy.triangle_balls(types, (a, b, c), shape.usable)
-        for target, row in zip(
-            rows, (*skew.pack(types, shape, dr.gather(types.UInt, names, triangle)), ball), strict=True
-        ):
-            dr.scatter(target, row, triangle)
-        return rows
+        setups, balls = targets
+        setups.store(skew.pack(types, shape, dr.gather(types.UInt, names, triangle)), triangle)
+        balls.store([ball], triangle)
+        return targets
 
     def _cluster_pass(self, cluster: Any, balls: Any, count: int, target: Any) -> Any:
-        dr.scatter(target, hierarchy.cluster_balls(self.types, cluster, balls, count), cluster)
+        target.store([hierarchy.cluster_balls(self.types, cluster, balls, count)], cluster)
         return target
 
     def _first_pass(self, lane: Any, cones: Any, balls: Any, clusters: int, cull: bool) -> Found:
@@ -207,15 +213,16 @@ class BundlePipeline:
         return hierarchy.refine_clusters(self.types, lane, cones, balls, count, before, cull)
 
     def _block_pass(
-        self, lane: Any, rays: Any, setups: list[Any], before: Found, counts: Any, state: "State"
-    ) -> tuple[Pairs, "State"]:
-        buffer = self._blank() if state.buffer is None else state.buffer
-        pairs, *counted = cover.block_pairs(
-            self.types, skew, self.output, lane, *rays, setups, before, counts, buffer, self.count
-        )
-        return pairs, State(buffer, self._counted(state.counters, counted))
+        self, lane: Any, bounds: Any, setups: Rows, before: Found, counts: Any, walking: bool
+    ) -> tuple[Pairs, cover.Small | None]:
+        return cover.block_pairs(self.types, skew, lane, *bounds, setups, before, counts, walking)
 
-    def _counted(self, counters: Any, counted: list[Any]) -> Any:
+    def _walk_pass(self, lane: Any, rays: Any, setups: Rows, few: cover.Small, state: "State") -> "State":
+        buffer = self._blank() if state.buffer is None else state.buffer
+        counted = cover.walk_small(self.types, skew, self.output, lane, rays, setups, few, buffer, self.count)
+        return State(buffer, self._counted(state.counters, counted))
+
+    def _counted(self, counters: Any, counted: Any) -> Any:
         """The counters with tests and hits of all lanes added."""
         if self.count:
             for slot, value in enumerate(counted):
@@ -255,13 +262,13 @@ class PlanePipeline(BundlePipeline):
         self._item_blocks = frozen(self._item_block_pass)
 
     def pairs(
-        self, task: Task, setups: list[Any], levels: list[Any], canvas: "Canvas", tell: Any
+        self, task: Task, setups: Rows, levels: list[Rows], canvas: "Canvas", tell: Any
     ) -> Iterator[tuple[Pairs, list[Any]]]:
         """Pairs of a block and an item, in chunks, and the items' rows."""
         types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
         faces = lanes(types, 0, dr.width(found_planes.first))
-        targets = room(types, 2, dr.width(faces))
-        cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, targets))
+        target = room(types, 2, dr.width(faces))
+        cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, target))
         fan = int(dr.max(found_planes.count)[0])
         for found, number in self.met(task, cones, levels, False, tell):
             cull = "triangles" in self.culling
@@ -280,8 +287,9 @@ class PlanePipeline(BundlePipeline):
                 yield pairs, items.rows
                 start += step
 
-    def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, targets: list[Any]) -> list[Any]:
-        return stored(joined(self.types, cones, first, count), number, targets)
+    def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, target: Rows) -> Rows:
+        target.store(joined(self.types, cones, first, count), number)
+        return target
 
     def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, before: Found, cull: bool) -> planes.Items:
         return planes.items(self.types, self.bound, lane, found, vertices, faces, before, cull)

@@ -9,6 +9,7 @@ from typing import Any
 
 import drjit as dr
 
+from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH
 from mpcam_kernels.skew import Rays
 
@@ -27,7 +28,7 @@ class Bundle:
 
     pixels: Rays
     cones: "Cones"
-    slopes: list[Any]
+    slopes: Rows
     groups: "Cones"
     first: Any
     count: Any
@@ -41,11 +42,11 @@ class Cones:
     an axis. rows: (centre, reach), (axis, spread); reach is negative where there is no ray.
     """
 
-    rows: list[Any]
+    rows: Rows
 
     def __call__(self, types: Any, number: Any, active: Any = True) -> tuple[Any, Any]:
         """The two rows of cones by number."""
-        first, second = (dr.gather(types.Array4f, row, number, active) for row in self.rows)
+        first, second = self.rows.at(types, number, active)
         return first, second
 
 
@@ -65,18 +66,6 @@ def may_meet(cone: tuple[Any, Any], ball: Any) -> Any:
     c = dr.squared_norm(away) - total * total
     possible = (c <= 0) | (a <= 1e-3) | ((b > 0) & (b * b >= a * c))
     return possible & (first.w >= 0) & (ball.w >= 0)
-
-
-def room(types: Any, rows: int, count: int) -> list[Any]:
-    """Arrays for rows of four numbers; frozen functions need them from outside, where their length may change."""
-    return [dr.empty(types.Float, 4 * count) for _ in range(rows)]
-
-
-def stored(rows: Any, number: Any, targets: list[Any]) -> list[Any]:
-    """The rows in these arrays."""
-    for target, row in zip(targets, rows, strict=True):
-        dr.scatter(target, row, number)
-    return targets
 
 
 def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:

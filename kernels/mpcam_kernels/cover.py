@@ -4,6 +4,7 @@ The side on which a ray passes an edge is linear in its direction and moment, wh
 known rest: so each edge is a line in the block, moved outwards by what the rest can amount to.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -12,61 +13,84 @@ from mpcam_kernels import blocks, walk
 from mpcam_kernels.bundles import Cones
 from mpcam_kernels.hierarchy import ROOM, Found
 from mpcam_kernels.regions import Region
+from mpcam_kernels.rows import Rows, room
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH
 
 SMALL = 32  # places between the lines that one lane walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
+@dataclass(frozen=True)
+class Small:
+    """Pairs whose few places one lane walks by itself. rows: three lines, with block and triangle; found: how many."""
+
+    rows: Rows
+    found: Any
+
+
 def block_pairs(
     types: Any,
     test: Any,
-    output: Any,
     lane: Any,
-    rays: Any,
     cones: Cones,
-    slopes: list[Any],
-    setups: list[Any],
+    slopes: Rows,
+    setups: Rows,
     before: Found,
     counts: Any,
-    buffer: Any,
-    count: bool,
-) -> tuple[blocks.Pairs, Any, Any]:
-    """Walk the few places that small triangles may cover, and list the others with the parts that they may cover.
+    walking: bool,
+) -> tuple[blocks.Pairs, Small | None]:
+    """Pairs of a block and a triangle with the parts that the triangle may cover; with `walking`, without small ones.
 
-    counts: zeros, one for each block. Returns pairs, tests and hits of each lane; `buffer` is raised to the hits' keys.
+    counts: zeros, one for each block.
     """
     block, triangle = dr.gather(types.Array2u, before.pairs, lane)
-    shape = test.unpack([dr.gather(types.Array4f, row, triangle) for row in setups])
+    shape = test.unpack(setups.at(types, triangle))
     edges, front, back = _edges(types, shape, cones, slopes, block)
-    area = _between(types, edges, front)
-    spans, places = area.spans(types), types.Int(0)
-    for row in range(HEIGHT):
-        start, stop = spans(types.Int(row), types.Int(row))
-        places += dr.maximum(stop - start, 0)
-    one_side = ~(front & back)
-    small = one_side & (places <= SMALL)
-    tests, hits = walk.walk(
-        types, test, output, shape, shape.name, area, small & (places > 0), rays, _placed(types, block), buffer, count
-    )
-    bits = dr.select(small, 0, _parts(types, edges, front, back))
+    bits, few = _parts(types, edges, front, back), None
+    if walking:
+        area = _between(types, edges, front)
+        rows, places = _box(types, area)
+        small = (bits != 0) & ~(front & back) & (places <= SMALL)
+        bits, number = dr.select(small, 0, bits), dr.zeros(types.UInt, 1)
+        dr.make_opaque(number)
+        some = small & (places > 0)
+        slot: Any = dr.scatter_inc(number, types.UInt(0), some)
+        few = Small(room(types, 3, ROOM), number)
+        names = [dr.reinterpret_array(types.Float, name) for name in (block, triangle, rows)]
+        few.rows.store([types.Array4f(*line, n) for line, n in zip(area.lines, names, strict=True)], slot, some)
     keep, found = bits != 0, dr.zeros(types.UInt, 1)
     dr.make_opaque(found)
-    slot: Any = dr.scatter_inc(found, types.UInt(0), keep)
+    slot = dr.scatter_inc(found, types.UInt(0), keep)
     rank = dr.scatter_inc(counts, block, keep)
     names, numbers, parts, ranks = (dr.empty(types.UInt, ROOM) for _ in range(4))
     for target, value in ((names, triangle), (numbers, block), (parts, bits), (ranks, rank)):
         dr.scatter(target, value, slot, keep)
-    return blocks.Pairs(names, numbers, parts, ranks, found, counts), tests, hits
+    return blocks.Pairs(names, numbers, parts, ranks, found, counts), few
 
 
-def _edges(types: Any, shape: Any, cones: Cones, slopes: list[Any], block: Any) -> tuple[list[Any], Any, Any]:
+def walk_small(
+    types: Any, test: Any, output: Any, lane: Any, rays: Any, setups: Rows, few: Small, buffer: Any, count: bool
+) -> tuple[Any, Any]:
+    """Raise `buffer` to the keys of small pairs; returns tests and hits of each lane."""
+    rows = few.rows.at(types, lane)
+    block, triangle, reach = (dr.reinterpret_array(types.UInt, row.w) for row in rows)
+    shape = test.unpack(setups.at(types, triangle))
+    lines, zero = (rows[0].xyz, rows[1].xyz, rows[2].xyz), types.Int(0)
+    area = Region(zero, types.Int(reach & 0xFF), zero + WIDTH, types.Int(reach >> 8), lines)
+
+    def place(x: Any, y: Any) -> Any:
+        return block * PIXELS + ((y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3))
+
+    return walk.walk(types, test, output, shape, shape.name, area, types.Bool(True), rays, place, buffer, count)
+
+
+def _edges(types: Any, shape: Any, cones: Cones, slopes: Rows, block: Any) -> tuple[list[Any], Any, Any]:
     """Per edge its value in the middle of the block, its slopes to the right and down, and what it may be off.
 
     And whether rays may start in front of the triangle's plane, seen along the normal, and behind it: in front they hit
     where all edges are positive, behind where all are negative.
     """
-    d, m, d_right, m_right, d_down, m_down = (dr.gather(types.Array4f, row, block) for row in slopes)
+    d, m, d_right, m_right, d_down, m_down = slopes.at(types, block)
     edges = []
     for across, along in shape.edges:
         slack = (d.w + 1e-6) * dr.norm(across)
@@ -94,6 +118,32 @@ def _between(types: Any, edges: list[Any], front: Any) -> Region:
     return Region(zero, zero, zero + WIDTH, zero + HEIGHT, (lines[0], lines[1], lines[2]))
 
 
+def _box(types: Any, area: Region) -> tuple[Any, Any]:
+    """First row + 256 times the row after the last between three lines, and how many places their box holds.
+
+    The box is that of the lines' three corners; where two are nearly parallel it is the whole block.
+    """
+    left, right, top, bottom = types.Float(dr.inf), types.Float(-dr.inf), types.Float(dr.inf), types.Float(-dr.inf)
+    one_way, other_way = types.Bool(True), types.Bool(True)
+    for i in range(3):
+        p, q = area.lines[i], area.lines[(i + 1) % 3]
+        turn = p.x * q.y - p.y * q.x
+        one_way, other_way = one_way & (turn > 1e-3), other_way & (turn < -1e-3)
+        inverse = 1.0 / turn
+        x, y = (p.y * q.z - q.y * p.z) * inverse, (q.x * p.z - p.x * q.z) * inverse
+        left, right, top, bottom = dr.minimum(left, x), dr.maximum(right, x), dr.minimum(top, y), dr.maximum(bottom, y)
+    proper = one_way | other_way
+
+    def ends(low: Any, high: Any, side: int) -> tuple[Any, Any]:
+        first, last = dr.ceil(dr.maximum(low - 0.51, 0.0)), dr.floor(dr.minimum(high + 0.51, float(side)))
+        first, last = dr.select(proper, first, 0.0), dr.select(proper, last, float(side))
+        return types.Int(dr.minimum(first, float(side))), types.Int(dr.maximum(last, 0.0))
+
+    (x0, x1), (y0, y1) = ends(left, right, WIDTH), ends(top, bottom, HEIGHT)
+    places = dr.maximum(x1 - x0, 0) * dr.maximum(y1 - y0, 0)
+    return types.UInt(y0) | (types.UInt(y1) << 8), places
+
+
 def _parts(types: Any, edges: list[Any], front: Any, back: Any) -> Any:
     """A bit for each part of a block that no edge excludes."""
     bits = types.UInt(0)
@@ -106,12 +156,3 @@ def _parts(types: Any, edges: list[Any], front: Any, back: Any) -> Any:
             positive, negative = positive & (value + reach >= 0), negative & (value - reach <= 0)
         bits |= dr.select(positive | negative, types.UInt(1 << part), 0)
     return bits
-
-
-def _placed(types: Any, block: Any) -> Any:
-    """A function from columns and rows within blocks to places."""
-
-    def place(x: Any, y: Any) -> Any:
-        return block * PIXELS + ((y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3))
-
-    return place

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from mpcam_kernels.rows import Rows
+
 Float = Any
 Vector = Any
 
@@ -23,16 +25,14 @@ class Ray(NamedTuple):
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays in memory, four numbers each: direction and how far the origin lies along it; moment, and 0."""
+    """Rays in memory, two rows each: direction and how far the origin lies along it; moment, and 0."""
 
-    directions: Any
-    moments: Any
+    rows: Rows
 
     def at(self, types: Any, number: Any, active: Any = True) -> Ray:
         """Rays by number. The origin is direction x moment, the point nearest to (0, 0, 0), plus its part along."""
-        first = dr.gather(types.Array4f, self.directions, number, active)
-        moment = dr.gather(types.Array4f, self.moments, number, active).xyz
-        direction = first.xyz
+        first, second = self.rows.at(types, number, active)
+        direction, moment = first.xyz, second.xyz
         return Ray(direction, moment, dr.fma(direction, first.w, dr.cross(direction, moment)))
 
     def run(self, types: Any, first: Any, count: int) -> list[Ray]:

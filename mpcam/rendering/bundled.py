@@ -240,13 +240,14 @@ def _frozen_rays(kind: str) -> Any:
     """Kernels from tables of camera triangles to rays and their bounds. kind: see `CameraTriangles.kind`."""
     import drjit as dr
 
-    from mpcam_kernels.bundles import Bundle, Cones, bounds, joined, room, stored
+    from mpcam_kernels.bundles import Bundle, Cones, bounds, joined
     from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.rows import Rows, room
     from mpcam_kernels.samples import PIXELS
     from mpcam_kernels.skew import Rays, packed
 
     @frozen
-    def rays(place: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any], targets: list[Any]) -> Rays:
+    def rays(place: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any], target: Rows) -> Rays:
         t = types()
         block = place // PIXELS
         face, side = dr.gather(t.UInt, fixed["face"], block), dr.gather(t.UInt, fixed["side"], block)
@@ -264,21 +265,27 @@ def _frozen_rays(kind: str) -> Any:
         direction = normalize(direction)
         valid = valid & (x + y < side) & dr.isfinite(direction.x + direction.y + direction.z)
         direction, origin = dr.select(valid, direction, 0), dr.select(valid, origin, 0)
-        return Rays(*stored(packed(t, direction, origin), place, targets))
+        target.store(packed(t, direction, origin), place)
+        return Rays(target)
 
     @frozen
-    def bound(block: Any, pixels: Rays, targets: list[Any]) -> list[Any]:
-        return stored(bounds(types(), pixels, block), block, targets)
+    def bound(block: Any, pixels: Rays, cones: Rows, slopes: Rows) -> tuple[Rows, Rows]:
+        first, second, *rest = bounds(types(), pixels, block)
+        cones.store([first, second], block)
+        slopes.store(rest, block)
+        return cones, slopes
 
     @frozen
-    def group(number: Any, cones: Any, first: Any, count: Any, targets: list[Any]) -> list[Any]:
-        return stored(joined(types(), cones, first, count), number, targets)
+    def group(number: Any, cones: Any, first: Any, count: Any, target: Rows) -> Rows:
+        target.store(joined(types(), cones, first, count), number)
+        return target
 
     def bundle(places: Any, block: Any, groups: Any, fixed: dict[str, Any], rows: Any, bent: dict[str, Any]) -> Bundle:
         used = {name: fixed[name] for name in ("face", "side", "x", "y")}
         pixels = rays(places, used, rows, bent, room(types(), 2, dr.width(places)))
-        first, second, *slopes = bound(block, pixels, room(types(), 8, dr.width(block)))
-        cones = Cones([first, second])
+        targets = (room(types(), count, dr.width(block)) for count in (2, 6))
+        cones, slopes = bound(block, pixels, *targets)
+        cones = Cones(cones)
         around = group(groups, cones, fixed["first"], fixed["count"], room(types(), 2, dr.width(groups)))
         corners = (fixed["x"], fixed["y"])
         return Bundle(pixels, cones, slopes, Cones(around), fixed["first"], fixed["count"], corners, None)

@@ -97,7 +97,7 @@ def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:
     t = types()
     prepared = Bundled(camera, mesh)
     rays, vertices, faces = prepared.rays.bundle.pixels, prepared.vertices, prepared.faces
-    place = dr.arange(t.UInt, dr.width(rays.moments) // 4)
+    place = dr.arange(t.UInt, dr.width(rays.rows.flat) // 8)
     each = rays.at(t, place)
 
     def step(number: object, hits: object) -> tuple[object, object]:
