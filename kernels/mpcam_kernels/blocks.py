@@ -43,15 +43,15 @@ class Squares:
 class Pairs:
     """Names of triangles, blocks that they may cover, which parts of these, and the rank in the block's list.
 
-    counts: pairs of each block.
+    counts: pairs of each block. found: how many pairs there are, if the arrays have more room.
     """
 
     names: Any
     blocks: Any
     parts: Any
     ranks: Any
-    found: Any
     counts: Any
+    found: Any = None
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,12 @@ def find_pairs(
     columns = ((names, item if by_item else triangle), (numbers, block), (parts, bits), (ranks, rank))
     for target, value in columns:
         dr.scatter(target, value, slot, bits != 0)
-    return Pairs(names, numbers, parts, ranks, found, counts)
+    return Pairs(names, numbers, parts, ranks, counts, found)
 
 
 def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:
     """Fill the lists, whose starts and counts are known; there may be more lanes than pairs."""
-    active = lanes < dr.gather(types.UInt, pairs.found, 0)
+    active = True if pairs.found is None else lanes < dr.gather(types.UInt, pairs.found, 0)
     columns = (pairs.names, pairs.blocks, pairs.parts, pairs.ranks)
     name, block, parts, rank = (dr.gather(types.UInt, column, lanes, active) for column in columns)
     slot = dr.gather(types.UInt, lists.starts, block, active) + rank

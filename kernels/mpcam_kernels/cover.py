@@ -4,79 +4,68 @@ The side on which a ray passes an edge is linear in its direction and moment, wh
 known rest: so each edge is a line in the block, moved outwards by what the rest can amount to.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
 from mpcam_kernels import blocks, walk
 from mpcam_kernels.bundles import Cones
-from mpcam_kernels.hierarchy import ROOM, Found
+from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.regions import Region
-from mpcam_kernels.rows import Rows, room
+from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH
 
 SMALL = 32  # places between the lines that one lane walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
-@dataclass(frozen=True)
-class Small:
-    """Pairs whose few places one lane walks by itself. rows: three lines, with block and triangle; found: how many."""
+def covered(
+    types: Any, test: Any, lane: Any, cones: Cones, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool
+) -> tuple[Any, Any, Any]:
+    """What of its block the triangle of each pair may cover.
 
-    rows: Rows
-    found: Any
-
-
-def block_pairs(
-    types: Any,
-    test: Any,
-    lane: Any,
-    cones: Cones,
-    slopes: Rows,
-    setups: Rows,
-    before: Found,
-    counts: Any,
-    walking: bool,
-) -> tuple[blocks.Pairs, Small | None]:
-    """Pairs of a block and a triangle with the parts that the triangle may cover; with `walking`, without small ones.
-
-    counts: zeros, one for each block.
+    Returns the parts as bits; whether it is small enough for a lane to walk (with `walking`); and whether it is for the
+    lists otherwise.
     """
-    block, triangle = dr.gather(types.Array2u, before.pairs, lane)
+    block, triangle = pairs.at(lane)
     shape = test.unpack(setups.at(types, triangle))
     edges, front, back = _edges(types, shape, cones, slopes, block)
-    bits, few = _parts(types, edges, front, back), None
+    bits, small = _parts(types, edges, front, back), types.Bool(False)
     if walking:
-        area = _between(types, edges, front)
-        rows, places = _box(types, area)
+        _, _, places = _box(types, _lines(types, edges, front))
         small = (bits != 0) & ~(front & back) & (places <= SMALL)
-        bits, number = dr.select(small, 0, bits), dr.zeros(types.UInt, 1)
-        dr.make_opaque(number)
-        some = small & (places > 0)
-        slot: Any = dr.scatter_inc(number, types.UInt(0), some)
-        few = Small(room(types, 3, ROOM), number)
-        names = [dr.reinterpret_array(types.Float, name) for name in (block, triangle, rows)]
-        few.rows.store([types.Array4f(*line, n) for line, n in zip(area.lines, names, strict=True)], slot, some)
-    keep, found = bits != 0, dr.zeros(types.UInt, 1)
-    dr.make_opaque(found)
-    slot = dr.scatter_inc(found, types.UInt(0), keep)
-    rank = dr.scatter_inc(counts, block, keep)
-    names, numbers, parts, ranks = (dr.empty(types.UInt, ROOM) for _ in range(4))
-    for target, value in ((names, triangle), (numbers, block), (parts, bits), (ranks, rank)):
-        dr.scatter(target, value, slot, keep)
-    return blocks.Pairs(names, numbers, parts, ranks, found, counts), few
+        return bits, small & (places > 0), (bits != 0) & ~small
+    return bits, small, bits != 0
+
+
+def listed(types: Any, chosen: Any, number: Any, pairs: Pairs, bits: Any, counts: Any) -> blocks.Pairs:
+    """Pairs by number, for the lists of their blocks. chosen: their places in `bits`. counts: zeros, one per block."""
+    block, triangle = pairs.at(number)
+    dr.make_opaque(counts)
+    rank = dr.scatter_inc(counts, block)
+    return blocks.Pairs(triangle, block, dr.gather(types.UInt, bits, chosen), rank, counts)
 
 
 def walk_small(
-    types: Any, test: Any, output: Any, lane: Any, rays: Any, setups: Rows, few: Small, buffer: Any, count: bool
+    types: Any,
+    test: Any,
+    output: Any,
+    number: Any,
+    rays: Any,
+    cones: Cones,
+    slopes: Rows,
+    setups: Rows,
+    pairs: Pairs,
+    buffer: Any,
+    count: bool,
 ) -> tuple[Any, Any]:
-    """Raise `buffer` to the keys of small pairs; returns tests and hits of each lane."""
-    rows = few.rows.at(types, lane)
-    block, triangle, reach = (dr.reinterpret_array(types.UInt, row.w) for row in rows)
+    """Raise `buffer` to the keys of small pairs by number; returns tests and hits of each lane."""
+    block, triangle = pairs.at(number)
     shape = test.unpack(setups.at(types, triangle))
-    lines, zero = (rows[0].xyz, rows[1].xyz, rows[2].xyz), types.Int(0)
-    area = Region(zero, types.Int(reach & 0xFF), zero + WIDTH, types.Int(reach >> 8), lines)
+    edges, front, _ = _edges(types, shape, cones, slopes, block)
+    lines = _lines(types, edges, front)
+    columns, rows, _ = _box(types, lines)
+    area = Region(columns[0], rows[0], columns[1], rows[1], lines)
 
     def place(x: Any, y: Any) -> Any:
         return block * PIXELS + ((y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3))
@@ -105,8 +94,8 @@ def _edges(types: Any, shape: Any, cones: Cones, slopes: Rows, block: Any) -> tu
     return edges, away + reach >= 0, away - reach <= 0
 
 
-def _between(types: Any, edges: list[Any], front: Any) -> Region:
-    """The places between the lines, for triangles of which rays start on one side only."""
+def _lines(types: Any, edges: list[Any], front: Any) -> tuple[Any, Any, Any]:
+    """Lines around the places that triangles may cover of which rays start on one side only (see `regions`)."""
     sign, lines = dr.select(front, types.Float(1), -1), []
     for middle, right, down, slack in edges:
         a, b = sign * right * (1 / WIDE), sign * down * (1 / HIGH)
@@ -114,19 +103,18 @@ def _between(types: Any, edges: list[Any], front: Any) -> Region:
         length = dr.sqrt(a * a + b * b)
         scale = 1.0 / dr.maximum(length, 1e-30)
         lines.append(types.Array3f(a * scale, b * scale, c * scale + 1e-3))
-    zero = types.Int(0)
-    return Region(zero, zero, zero + WIDTH, zero + HEIGHT, (lines[0], lines[1], lines[2]))
+    return lines[0], lines[1], lines[2]
 
 
-def _box(types: Any, area: Region) -> tuple[Any, Any]:
-    """First row + 256 times the row after the last between three lines, and how many places their box holds.
+def _box(types: Any, lines: tuple[Any, Any, Any]) -> tuple[tuple[Any, Any], tuple[Any, Any], Any]:
+    """Columns and rows between three lines, first and one past the last, and how many places they have.
 
     The box is that of the lines' three corners; where two are nearly parallel it is the whole block.
     """
     left, right, top, bottom = types.Float(dr.inf), types.Float(-dr.inf), types.Float(dr.inf), types.Float(-dr.inf)
     one_way, other_way = types.Bool(True), types.Bool(True)
     for i in range(3):
-        p, q = area.lines[i], area.lines[(i + 1) % 3]
+        p, q = lines[i], lines[(i + 1) % 3]
         turn = p.x * q.y - p.y * q.x
         one_way, other_way = one_way & (turn > 1e-3), other_way & (turn < -1e-3)
         inverse = 1.0 / turn
@@ -139,9 +127,8 @@ def _box(types: Any, area: Region) -> tuple[Any, Any]:
         first, last = dr.select(proper, first, 0.0), dr.select(proper, last, float(side))
         return types.Int(dr.minimum(first, float(side))), types.Int(dr.maximum(last, 0.0))
 
-    (x0, x1), (y0, y1) = ends(left, right, WIDTH), ends(top, bottom, HEIGHT)
-    places = dr.maximum(x1 - x0, 0) * dr.maximum(y1 - y0, 0)
-    return types.UInt(y0) | (types.UInt(y1) << 8), places
+    columns, rows = ends(left, right, WIDTH), ends(top, bottom, HEIGHT)
+    return columns, rows, dr.maximum(columns[1] - columns[0], 0) * dr.maximum(rows[1] - rows[0], 0)
 
 
 def _parts(types: Any, edges: list[Any], front: Any, back: Any) -> Any:

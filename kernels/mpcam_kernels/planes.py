@@ -9,8 +9,8 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import blocks, regions
-from mpcam_kernels.hierarchy import ROOM, Found
+from mpcam_kernels import regions
+from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.samples import PART, PARTS
 
 
@@ -36,7 +36,6 @@ class Items:
 
     rows: list[Any]
     faces: Any
-    found: Any
 
 
 def outline(types: Any, bound: str, planes: Planes, face: Any, points: list[Any]) -> tuple[regions.Outline, Any]:
@@ -80,10 +79,10 @@ def _all(types: Any) -> Any:
 
 
 def items(
-    types: Any, bound: str, lane: Any, planes: Planes, vertices: Any, faces: Any, before: Found, cull: bool
-) -> Items:
-    """Regions of pairs of a camera triangle and a triangle; with `cull`, those that hold a pixel of it."""
-    face, triangle = dr.gather(types.Array2u, before.pairs, lane)
+    types: Any, bound: str, lane: Any, planes: Planes, vertices: Any, faces: Any, pairs: Pairs, cull: bool
+) -> tuple[Any, Any]:
+    """Regions of pairs of a camera triangle and a triangle, and whether there is any; with `cull`, any pixel in it."""
+    face, triangle = pairs.at(lane)
     corners = dr.gather(types.Array3u, faces, triangle)
     points = [dr.gather(types.Array3f, vertices, corner) for corner in corners]
     shape, side = outline(types, bound, planes, face, points)
@@ -95,43 +94,26 @@ def items(
         for a, b, c in area.lines:
             most = dr.maximum(dr.maximum(0.5 * (a + b), a * (side - 0.5) + 0.5 * b), 0.5 * a + b * (side - 0.5))
             some &= most + c >= 0
-    found = dr.zeros(types.UInt, 1)
-    dr.make_opaque(found)
-    slot: Any = dr.scatter_inc(found, types.UInt(0), some)
-    room, owners = [dr.empty(types.Float, 4 * ROOM) for _ in range(3)], dr.empty(types.UInt, ROOM)
-    for target, row in zip(room, regions.pack(types, area, triangle), strict=True):
-        dr.scatter(target, row, slot, some)
-    dr.scatter(owners, face, slot, some)
-    return Items(room, owners, found)
+    return regions.pack(types, area, triangle), some
 
 
-def block_pairs(
-    types: Any, lane: Any, fan: int, planes: Planes, items: Items, corner: tuple[Any, Any], counts: Any
-) -> blocks.Pairs:
-    """Items and the blocks that they reach, with the parts. fan: most blocks of a camera triangle; corner: first column
-    and row of each block."""
+def reached(types: Any, lane: Any, fan: int, planes: Planes, items: Items, corners: Any) -> tuple[Any, Any, Any]:
+    """Item, block and parts that its region reaches, for each block of its camera triangle; fan: most of these.
+
+    corners: first column and row of each block.
+    """
     item, k = lane // fan, lane % fan
     face = dr.gather(types.UInt, items.faces, item)
     exists = k < dr.gather(types.UInt, planes.count, face)
     block = dr.gather(types.UInt, planes.first, face) + k
     area, _ = regions.unpack(types, [dr.gather(types.Array4f, row, item) for row in items.rows])
-    x, y = (types.Int(dr.gather(types.UInt, values, block, exists)) for values in corner)
+    x, y = (types.Int(dr.gather(types.UInt, values, block, exists)) for values in corners)
     spans, bits = area.spans(types), types.UInt(0)
     last = types.Int(dr.gather(types.UInt, planes.side, face)) - 1
     for part in range(PARTS):
         left, top = x + (part % 4) * PART, y + (part // 4) * PART
         first, end = dr.maximum(top, area.y0), dr.minimum(top + PART, area.y1) - 1
         start, stop = spans(first, end)
-        reached = (
-            exists & (first <= end) & (start < left + PART) & (stop > left) & (start < stop) & (left + top <= last)
-        )
-        bits |= dr.select(reached, types.UInt(1 << part), 0)
-    found = dr.zeros(types.UInt, 1)
-    dr.make_opaque(counts, found)
-    slot: Any = dr.scatter_inc(found, types.UInt(0), bits != 0)
-    rank = dr.scatter_inc(counts, block, bits != 0)
-    room = [dr.empty(types.UInt, ROOM) for _ in range(4)]
-    for target, value in zip(room, (item, block, bits, rank), strict=True):
-        dr.scatter(target, value, slot, (bits != 0) & (slot < ROOM))
-    names, numbers, parts, ranks = room
-    return blocks.Pairs(names, numbers, parts, ranks, found, counts)
+        within = exists & (first <= end) & (start < left + PART) & (stop > left) & (start < stop)
+        bits |= dr.select(within & (left + top <= last), types.UInt(1 << part), 0)
+    return item, block, bits

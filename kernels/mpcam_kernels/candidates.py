@@ -1,0 +1,137 @@
+"""Pairs of a bundle of rays and a triangle that may meet, in chunks of bounded memory."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+from mpcam_kernels import hierarchy, skew
+from mpcam_kernels.bundles import Bundle, Cones
+from mpcam_kernels.frozen import frozen
+from mpcam_kernels.hierarchy import FAN, Pairs
+from mpcam_kernels.lanes import lanes
+from mpcam_kernels.rows import Rows, room
+
+LANES = 1 << 22  # at a time
+GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
+CULLING = ("objects", "triangles")
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle, neighbours close together; names: the
+    triangles' own numbers; counts: triangles, then clusters level by level; bundle: the rays; fan: most blocks in a
+    group.
+    """
+
+    vertices: Any
+    faces: Any
+    names: Any
+    counts: tuple[int, ...]
+    bundle: Bundle
+    fan: int
+
+
+class Candidates:
+    """Steps from all pairs down to those of a block, or a camera triangle, and a triangle; frozen.
+
+    culling: what is left out early (Hou et al. 2006, section 2.4): "objects" holds clusters of triangles against bundles
+    of rays, "triangles" each triangle by itself; without them all pairs are looked at.
+    """
+
+    def __init__(self, types: Any, culling: tuple[str, ...]):
+        self.types, self.culling = types, culling
+        self._set_up = frozen(self._set_up_pass)
+        self._clusters = frozen(self._cluster_pass)
+        self._mark = frozen(self._mark_pass)
+        self._keep = frozen(self._keep_pass)
+
+    def triangles(self, task: Task) -> tuple[Rows, list[Rows]]:
+        """Set-ups of the triangles, and the balls around them and, level by level, around clusters."""
+        types, counts = self.types, task.counts
+        targets = room(types, skew.ROWS, counts[0]), room(types, 1, counts[0])
+        setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, task.names, targets)
+        levels = [balls]
+        for level, count in enumerate(counts[1:] if "objects" in self.culling else ()):
+            target = room(types, 1, count)
+            levels.append(self._clusters(lanes(types, 0, count), levels[-1], counts[level], target))
+        return setups, levels
+
+    def met(self, task: Task, cones: Cones, levels: list[Rows], split: bool, tell: Any) -> Iterator[tuple[Pairs, int]]:
+        """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
+
+        cones: of the bundles to begin with; split: they are groups, and blocks take their place on the way down.
+        tell(stage, arrays) is told after each step.
+        """
+        bundle, top = task.bundle, len(levels) - 1
+        bundles = dr.width(cones.rows.flat) // (4 * cones.rows.count)
+
+        def down(level: int, groups: bool, pairs: Pairs, number: int) -> Iterator[tuple[Pairs, int]]:
+            if level == 0 and not groups:
+                yield pairs, number
+                return
+            around = bundle.groups if groups else bundle.cones if split else cones
+            if groups and (level == 0 or FAN**level <= GROUPED):
+                step, fan, below, groups = ("groups", task.fan, bundle.first, bundle.count), task.fan, level, False
+                around = bundle.cones
+            else:
+                step, fan, below = ("clusters", task.counts[level - 1]), FAN, level - 1
+            for after in self._passed(number, fan, step, around, levels[below], pairs, self._culls(below), tell):
+                yield from down(below, groups, *after)
+
+        step = ("all", task.counts[top])
+        for after in self._passed(
+            bundles * task.counts[top], 1, step, cones, levels[top], None, self._culls(top), tell
+        ):
+            yield from down(top, split, *after)
+
+    def _passed(
+        self, number: int, fan: int, step: Any, cones: Cones, balls: Rows, before: Pairs | None, cull: bool, tell: Any
+    ) -> Iterator[tuple[Pairs, int]]:
+        """A step over all pairs, a lane for each of their `fan` children, in chunks."""
+        many = max(1, LANES // fan)
+        for start in range(0, number, many):
+            lane = lanes(self.types, start * fan, min(number, start + many) * fan)
+            chosen = dr.compress(self._mark(lane, step, cones, balls, before, cull))
+            found = dr.width(chosen)
+            tell("candidates", chosen)
+            if found:
+                yield self._keep(chosen, lane, step, before), found
+
+    def _culls(self, level: int) -> bool:
+        return "triangles" in self.culling if level == 0 else True
+
+    def _children(self, lane: Any, step: Any, before: Any) -> tuple[Any, Any, Any]:
+        """Bundle and ball of each lane, and whether there are such."""
+        name, *rest = step
+        if name == "all":
+            return hierarchy.all_pairs(lane, *rest)
+        if name == "groups":
+            return hierarchy.in_groups(self.types, lane, *rest, before)
+        return hierarchy.in_clusters(lane, *rest, before)
+
+    def _mark_pass(self, lane: Any, step: Any, cones: Cones, balls: Rows, before: Any, cull: bool) -> Any:
+        bundle, ball, exists = self._children(lane, step, before)
+        return hierarchy.meeting(self.types, cones, bundle, balls, ball, exists, cull)
+
+    def _keep_pass(self, chosen: Any, lane: Any, step: Any, before: Any) -> Pairs:
+        bundle, ball, _ = self._children(dr.gather(self.types.UInt, lane, chosen), step, before)
+        return Pairs(bundle, ball)
+
+    def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, targets: Any) -> Any:
+        types = self.types
+        corners = dr.gather(types.Array3u, faces, triangle)
+        a, b, c = (dr.gather(types.Array3f, vertices, corner) for corner in corners)
+        shape = skew.setup(a, b, c)
+        setups, balls = targets
+        setups.store(skew.pack(types, shape, dr.gather(types.UInt, names, triangle)), triangle)
+        balls.store([hierarchy.triangle_balls(types, (a, b, c), shape.usable)], triangle)
+        return targets
+
+    def _cluster_pass(self, cluster: Any, balls: Rows, count: int, target: Rows) -> Rows:
+        target.store([hierarchy.cluster_balls(self.types, cluster, balls, count)], cluster)
+        return target
+
+
+Tell = Callable[[str, Any], None]
