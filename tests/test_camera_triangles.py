@@ -234,16 +234,17 @@ def test_many_triangles_by_levels_of_clusters():
 
 def test_chunks_give_the_same_frame(monkeypatch):
     from mpcam.rendering import bundled
-    from mpcam_kernels import bundle_pipeline, hierarchy, planes
+    from mpcam_kernels import bundle_pipeline, candidates
 
     camera = patch(3, 31)
 
     mesh = around(camera, 400, 0.7)
     whole = mp.rasterize(camera, mesh)
     bundled._pipeline.cache_clear()
-    for module in (hierarchy, bundle_pipeline, planes):
-        monkeypatch.setattr(module, "ROOM", 2000)
-    monkeypatch.setattr(bundle_pipeline, "LANES", 5000)
+    monkeypatch.setattr(bundle_pipeline, "ROOM", 2000)
+    monkeypatch.setattr(bundle_pipeline, "MANY", 100)
+    for module in (bundle_pipeline, candidates):
+        monkeypatch.setattr(module, "LANES", 5000)
     for bound in ("tight", "nine_point"):
         assert np.array_equal(mp.rasterize(camera, mesh, bound=bound).triangle, whole.triangle)
     bundled._pipeline.cache_clear()

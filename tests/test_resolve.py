@@ -89,7 +89,7 @@ def test_texels_never_leave_their_triangle(filter, side):
         assert gap.max() <= np.sqrt(0.5) + 1e-9
         return
     right, down, both = more
-    assert min(part.min() for part in more) >= 0 and sum(more).max() <= 1
+    assert min(part.min() for part in more) >= 0 and (right + down + both).max() <= 1
     assert (column + row)[(right > 0) | (down > 0)].max() < last
     assert both[column + row + 2 > last].max(initial=0.0) == 0
     assert np.allclose(column + right + both, second * last, atol=1e-9)

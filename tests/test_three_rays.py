@@ -9,6 +9,7 @@ import pytest
 
 from mpcam.cameras import three_rays_quartic as hou
 from mpcam.cameras.three_rays import inside, project
+from mpcam.errors import InputError
 from mpcam.math import polynomial
 from mpcam.math.cubic import cubic_roots, determinant_cubic
 from mpcam.stress import camera_triangles as stress
@@ -82,11 +83,11 @@ def test_coefficients_keep_what_plain_products_lose():
     a = rng.normal(size=(3, 3)).astype(np.float32)
     columns = [[np.float32(x) for x in row] for row in d], [[np.float32(x) for x in row] for row in a]
     exact = float(stress._det(*[[stress.Fraction(float(x)) for x in row] for row in d]))
-    assert abs(determinant_cubic(columns[1], columns[0])[3] - exact) < 1e-6 * abs(exact)
-    traced = jax.jit(lambda a, d: determinant_cubic(list(a), list(d)))(a, d)[3]
+    assert abs(determinant_cubic(columns[1], columns[0])[0][3] - exact) < 1e-6 * abs(exact)
+    traced = jax.jit(lambda a, d: determinant_cubic(list(a), list(d)))(a, d)[0][3]
     assert abs(traced - exact) < 1e-6 * abs(exact)
     held = [[types.Float(float(x)) for x in row] for row in a], [[types.Float(float(x)) for x in row] for row in d]
-    assert abs(determinant_cubic(*held)[3].numpy()[0] - exact) < 1e-6 * abs(exact)
+    assert abs(determinant_cubic(*held)[0][3].numpy()[0] - exact) < 1e-6 * abs(exact)
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +136,11 @@ def test_a_wrong_image_would_be_found():
     fewer = found * [[1], [0], [1]]
     assert stress.judge_one(v, d, q, fewer, 2.0**-52)[1] == 1
     assert stress.judge_one(v, d, q, found[[0, 1, 1]], 2.0**-52)[1:] == (1, 1)
+
+
+def test_the_suite_wants_points():
+    with pytest.raises(InputError, match="at least 1"):
+        stress.run(points=0)
 
 
 def only(images):

@@ -95,13 +95,13 @@ class BundlePipeline:
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))
                 bits, small, listed = self._cover(lane, bounds, setups, found, walking)
-                few = dr.compress(small) if walking else ()
-                if len(few):
+                few = dr.compress(small) if walking else types.UInt()
+                if dr.width(few):
                     canvas.state = self._walk(few, lane, task.bundle.pixels, bounds, setups, found, canvas.state)
                     tell("small", canvas.state)
                 many = dr.compress(listed)
                 tell("blocks", many)
-                if len(many):
+                if dr.width(many):
                     yield self._listed(many, lane, found, bits, dr.zeros(types.UInt, self.blocks)), []
 
     def _blank(self) -> Any:
@@ -111,15 +111,17 @@ class BundlePipeline:
         return buffer
 
     def _cover_pass(self, lane: Any, bounds: Any, setups: Rows, pairs: Pairs, walking: bool) -> tuple[Any, Any, Any]:
-        return cover.covered(self.types, skew, lane, *bounds, setups, pairs, walking)
+        cones, slopes = bounds
+        return cover.covered(self.types, skew, lane, cones, slopes, setups, pairs, walking)
 
     def _walk_pass(
         self, chosen: Any, lane: Any, rays: Any, bounds: Any, setups: Rows, pairs: Pairs, state: State
     ) -> State:
         buffer = self._blank() if state.buffer is None else state.buffer
         number = dr.gather(self.types.UInt, lane, chosen)
+        cones, slopes = bounds
         counted = cover.walk_small(
-            self.types, skew, self.output, number, rays, *bounds, setups, pairs, buffer, self.count
+            self.types, skew, self.output, number, rays, cones, slopes, setups, pairs, buffer, self.count
         )
         return State(buffer, self._counted(state.counters, counted))
 
@@ -130,7 +132,7 @@ class BundlePipeline:
         return list_pairs(self.types, lane, pairs, lists)
 
     def _pixel_pass(self, lane: Any, rays: Any, corners: Any, large: Large, lists: Lists, state: State) -> State:
-        buffer = self._blank() if state.buffer is None else state.buffer
+        buffer = self.blocks * PIXELS if state.buffer is None else state.buffer
 
         def corner(place: Any) -> tuple[Any, Any]:
             """Column and row of places within their camera triangle."""
@@ -183,15 +185,16 @@ class PlanePipeline(BundlePipeline):
                 rows, some = self._items(lane, found_planes, task.vertices, task.faces, found, cull)
                 chosen = dr.compress(some)
                 tell("bounds", chosen)
-                if not len(chosen):
+                many = dr.width(chosen)
+                if not many:
                     continue
-                items = self._chosen(chosen, lane, rows, found)
-                many = len(chosen)
+                targets = [dr.empty(types.Float, 4 * many) for _ in rows]
+                items = self._chosen(lanes(types, 0, many), chosen, lane, rows, found, targets)
                 for first in range(0, many, max(1, LANES // fan)):
                     lane = lanes(types, first * fan, min(many, first + max(1, LANES // fan)) * fan)
                     item, block, bits = self._reached(lane, fan, found_planes, items, bundle.corners)
                     some = dr.compress(bits != 0)
-                    if len(some):
+                    if dr.width(some):
                         yield self._joined(some, item, block, bits, dr.zeros(types.UInt, self.blocks)), items.rows
 
     def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, target: Rows) -> Rows:
@@ -201,10 +204,13 @@ class PlanePipeline(BundlePipeline):
     def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, pairs: Pairs, cull: bool) -> Any:
         return planes.items(self.types, self.bound, lane, found, vertices, faces, pairs, cull)
 
-    def _chosen_pass(self, chosen: Any, lane: Any, rows: list[Any], pairs: Pairs) -> Any:
+    def _chosen_pass(
+        self, item: Any, chosen: Any, lane: Any, rows: list[Any], pairs: Pairs, targets: list[Any]
+    ) -> planes.Items:
         face, _ = pairs.at(dr.gather(self.types.UInt, lane, chosen))
-        kept = [dr.gather(type(row), row, chosen) for row in rows]
-        return planes.Items(kept, face)
+        for target, row in zip(targets, rows, strict=True):
+            dr.scatter(target, dr.gather(self.types.Array4f, row, chosen), item)
+        return planes.Items(targets, face)
 
     def _reached_pass(self, lane: Any, fan: int, found: Any, items: Any, corners: Any) -> tuple[Any, Any, Any]:
         return planes.reached(self.types, lane, fan, found, items, corners)

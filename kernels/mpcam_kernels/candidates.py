@@ -36,8 +36,8 @@ class Task:
 class Candidates:
     """Steps from all pairs down to those of a block, or a camera triangle, and a triangle; frozen.
 
-    culling: what is left out early (Hou et al. 2006, section 2.4): "objects" holds clusters of triangles against bundles
-    of rays, "triangles" each triangle by itself; without them all pairs are looked at.
+    culling: what is left out early (Hou et al. 2006, section 2.4): "objects" holds clusters of triangles against
+    bundles of rays, "triangles" each triangle by itself; without them all pairs are looked at.
     """
 
     def __init__(self, types: Any, culling: tuple[str, ...]):
@@ -106,10 +106,11 @@ class Candidates:
         """Bundle and ball of each lane, and whether there are such."""
         name, *rest = step
         if name == "all":
-            return hierarchy.all_pairs(lane, *rest)
+            return hierarchy.all_pairs(lane, rest[0])
         if name == "groups":
-            return hierarchy.in_groups(self.types, lane, *rest, before)
-        return hierarchy.in_clusters(lane, *rest, before)
+            fan, first, count = rest
+            return hierarchy.in_groups(self.types, lane, fan, first, count, before)
+        return hierarchy.in_clusters(lane, rest[0], before)
 
     def _mark_pass(self, lane: Any, step: Any, cones: Cones, balls: Rows, before: Any, cull: bool) -> Any:
         bundle, ball, exists = self._children(lane, step, before)

@@ -15,7 +15,7 @@ from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH
 
-SMALL = 32  # places between the lines that one lane walks by itself
+SMALL = 48  # places between the lines that one lane walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 

@@ -32,14 +32,19 @@ def through_lists(
 
     lane: the numbers of the lanes, PER_LANE pixels each; from outside, since a frozen kernel that counts them itself
     takes its size from any array of a multiple of it, and replays the size that this array has then.
-    corner: from places to columns and rows, for regions. bounded: pixels outside of a triangle's region are not tested.
+    buffer: keys so far, or the number of places where there are none yet. corner: from places to columns and rows, for
+    regions. bounded: pixels outside of a triangle's region are not tested.
     """
     place = lane * PER_LANE
     block, part = place // PIXELS, (place >> 4) % PARTS
     four = types.Array4u64 if output.kind(types) is types.UInt64 else types.Array4u
     fours = [lane * FOURS + k for k in range(FOURS)]
-    views = samples.run(types, place, PER_LANE)
-    before = [key for at in fours for key in dr.gather(four, buffer, at)]
+    views: list[Any] = []
+    if isinstance(buffer, int):  # nothing was drawn yet
+        before, result = [output.kind(types)(0)] * PER_LANE, dr.empty(output.kind(types), buffer)
+    else:
+        before = [key for at in fours for key in dr.gather(four, buffer, at)]
+        result = dr.empty(type(buffer), dr.width(buffer))
     x, y = corner(place) if bounded else (place, place)
     start = dr.gather(types.UInt, lists.starts, block)
     end = start + dr.gather(types.UInt, lists.counts, block)
@@ -98,14 +103,19 @@ def through_lists(
     # A test of nearness 0 is no hit, but ties with nothing, which has it too: such an owner is masked below.
     owners = [output.triangle(types, key) for key in before] if hasattr(output, "triangle") else []
     best = [output.nearness(types, key) if output.depth else key > 0 for key in before]
-    state = (best, owners, types.UInt(0), types.UInt(0), sought(start))
-    best, owners, tests, hits, _ = dr.while_loop(state, unfinished, body)
+
+    def draw(best: Any, owners: Any, tests: Any, hits: Any) -> Any:
+        views[:] = samples.run(types, place, PER_LANE)
+        return dr.while_loop((best, owners, tests, hits, sought(start)), unfinished, body)[:4]
+
+    state = (best, owners, types.UInt(0), types.UInt(0))
+    # Many blocks have no list: they need no samples.
+    best, owners, tests, hits = dr.if_stmt(state, start < end, draw, lambda *state: state)
     if output.depth:
         keys = [output.key(types, near, owners[k] if owners else None) for k, near in enumerate(best)]
         keys = [dr.select(near > 0, key, 0) for near, key in zip(best, keys, strict=True)]
     else:
         keys = [dr.select(one, types.UInt(1), 0) for one in best]
-    result = dr.empty(type(buffer), dr.width(buffer))
 
     # One scatter in a loop: two to one array would be two kernels, each with all of the above.
     def store(k: Any) -> Any:

@@ -1,0 +1,170 @@
+"""From a curved mirror or lens to camera triangles (Hou et al. 2006, section 2.3)."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.decomposition.coarse import Coarse, Coarsening
+from mpcam.decomposition.reflector import Reflector, reflector_of
+from mpcam.decomposition.shooting import Locator, shoot
+from mpcam.decomposition.views import SLACK, View, on_mesh, view_of
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.surfaces import Surface
+
+MODES = ("normals", "directions")
+MOST = 100_000
+"""Camera triangles at most."""
+_TRIES = 6
+_INNER = np.array(
+    [
+        (0.9, 0.05, 0.05),
+        (0.05, 0.9, 0.05),
+        (0.05, 0.05, 0.9),
+        (0.46, 0.46, 0.08),
+        (0.46, 0.08, 0.46),
+        (0.08, 0.46, 0.46),
+    ]
+)
+"""Weights of points of a triangle where it is looked whether it is seen."""
+
+
+def decompose(
+    reflector: Mesh | Surface,
+    eye: Any,
+    triangles: int = 104,
+    *,
+    resolution: Any = 64,
+    index: float | None = None,
+    mode: str = "normals",
+) -> CameraTriangles:
+    """Camera triangles that stand for a reflector, or with `index` for a refractor, as an eye sees it.
+
+    reflector: a Mesh (one without normals is taken for smooth; `Mesh.flat` makes facets) or a Surface. eye: a point
+    (3,) in the world, or a camera with a common centre. triangles: how many camera triangles at most; those that the
+    eye does not see (hidden by the reflector itself, or outside of the camera's image) are left out and do not count. A
+    mesh of fewer triangles is taken as it is, which is exact; where the shape needs more to stay whole (a closed
+    surface has 4, some of them seen), there are more. resolution: pixels along the short sides of each triangle in the
+    atlas. index: refractive index behind the surface over that on the eye's side, None for a mirror. mode: "normals"
+    bends the rays pixel by pixel, "directions" only at the vertices (the direct camera, for comparison).
+
+    Vertices lie on the true surface and have its normals. Both sides of the surface count. Returns CameraTriangles in
+    the world frame. Raises InputError for an eye that sees nothing of the reflector or lies on it, and for other
+    values.
+    """
+    if mode not in MODES:
+        raise InputError(f"mode={mode!r}: allowed are {', '.join(MODES)}")
+    if isinstance(triangles, bool) or not isinstance(triangles, (int, np.integer)) or not 1 <= triangles <= MOST:
+        raise InputError(f"triangles={shown(triangles)}: give a whole number from 1 to {MOST:,}")
+    whole = reflector_of(reflector)
+    view = view_of(whole, eye)
+    coarse = _seen_part(whole, view, int(triangles))
+    cams = CameraTriangles(
+        coarse.vertices, coarse.faces, normals=coarse.normals, eye=view.eye, resolution=resolution, index=index
+    )
+    return cams if mode == "normals" else directions_at_vertices(cams)
+
+
+def directions_at_vertices(cams: CameraTriangles) -> CameraTriangles:
+    """The direct camera of camera triangles with normals: rays bent at the vertices only, and interpolated between.
+
+    Raises InputError where there are directions already, or a vertex reflects totally.
+    """
+    if cams.normals is None:
+        raise InputError("directions_at_vertices: these camera triangles have directions already")
+    ways, valid = cams.bend(cams.vertices.T, cams.normals.T)
+    if not valid.all():
+        raise InputError(
+            f"mode='directions': light is totally reflected at {int((~valid).sum())} of {len(valid)} vertices, which "
+            "then have no ray: use mode='normals', or another index"
+        )
+    return dataclasses.replace(cams, directions=ways.T, normals=None, eye=None, index=None)
+
+
+def subdivided(
+    cams: CameraTriangles, reflector: Mesh | Surface, levels: int = 1, resolution: Any = None
+) -> CameraTriangles:
+    """Each camera triangle in four, `levels` times (26, 26 x 4 and 26 x 4^2 triangles: Hou et al. 2006, Table 1).
+
+    The new vertices, in the middle of the edges, are put on the true surface by normal shooting and have its normals.
+    resolution: pixels along the short sides of all; default: half of what it was at each level, at least 2. Raises
+    InputError for camera triangles with directions, and levels that are not whole numbers from 0 to 6.
+    """
+    if cams.normals is None:
+        raise InputError(
+            "subdivided: give camera triangles with normals, and see directions_at_vertices for the result"
+        )
+    if isinstance(levels, bool) or not isinstance(levels, (int, np.integer)) or not 0 <= levels <= 6:
+        raise InputError(f"levels={shown(levels)}: give a whole number from 0 to 6")
+    whole = reflector_of(reflector)
+    pose = np.asarray(cams.camera_from_world)
+    vertices, normals = (cams.vertices - pose[:3, 3]) @ pose[:3, :3], cams.normals @ pose[:3, :3]
+    faces, sides = cams.faces, np.asarray(cams.resolution)
+    for _ in range(levels):
+        ends, number = np.unique(
+            np.sort(faces[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2), axis=1), axis=0, return_inverse=True
+        )
+        middle, toward = vertices[ends].mean(axis=1), normals[ends].sum(axis=1)
+        shot = shoot(whole, middle, toward)
+        a, b, c = faces.T
+        bc, ca, ab = number.reshape(-1, 3).T + len(vertices)
+        four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
+        faces = np.stack([np.stack(part, axis=1) for part in four], axis=1).reshape(-1, 3)
+        vertices, normals = np.concatenate([vertices, shot.points]), np.concatenate([normals, shot.normals])
+        sides = np.maximum((np.repeat(sides, 4) if sides.ndim else sides) // 2, 2)
+    return dataclasses.replace(
+        cams,
+        vertices=vertices @ pose[:3, :3].T + pose[:3, 3],
+        normals=normals @ pose[:3, :3].T,
+        faces=faces,
+        resolution=sides if resolution is None else resolution,
+    )
+
+
+def _seen_part(reflector: Reflector, view: View, triangles: int) -> Coarse:
+    """The coarse mesh of which the eye sees at most so many triangles, as near to that as a few tries come."""
+    coarsening = Coarsening(reflector, view, triangles)
+    wanted, best, fewest, most = triangles, None, 0, None
+    for _ in range(_TRIES):
+        coarse = coarsening.mesh(wanted)
+        seen = seen_triangles(reflector, coarse, view)
+        part = coarse.part(seen)
+        count = len(part.faces)
+        if best is None or (count <= triangles) > (len(best.faces) <= triangles):
+            best = part
+        elif (count <= triangles) == (len(best.faces) <= triangles):
+            nearer = abs(count - triangles) < abs(len(best.faces) - triangles)
+            best = part if nearer else best
+        # Enough: within 2 %, or nothing left to take away or to add.
+        if triangles - max(triangles // 50, 1) <= count <= triangles or len(coarse.faces) > wanted or coarse.exact:
+            break
+        if count > triangles:
+            most = wanted if most is None else min(most, wanted)
+        else:
+            fewest = max(fewest, wanted)
+        wanted = int(np.clip(round(wanted * triangles / max(count, 1)), wanted // 4, wanted * 4))
+        if most is not None and not fewest < wanted < most:
+            wanted = (fewest + most) // 2
+        if wanted in (fewest, most) or wanted < 1:
+            break
+    assert best is not None
+    return best
+
+
+def seen_triangles(reflector: Reflector, coarse: Coarse, view: View) -> np.ndarray:
+    """(F,) which triangles hold a point of the reflector that the eye sees."""
+    place = Locator(coarse.vertices, coarse.normals, coarse.faces).locate(view.points, view.normals)
+    seen = np.zeros(len(coarse.faces), bool)
+    seen[place.face] = True
+    if not view.whole:
+        # Small ones that no sample fell on: are points of their own seen?
+        left = np.flatnonzero(~seen)
+        points, ways = (
+            np.einsum("kc,fcx->fkx", _INNER, v[coarse.faces[left]]) for v in (coarse.vertices, coarse.normals)
+        )
+        shot = shoot(reflector, points.reshape(-1, 3), ways.reshape(-1, 3))
+        own = on_mesh(reflector, shot.face, shot.second, shot.third)
+        seen[left] = reflector.sees(view.eye, own, SLACK).reshape(len(left), len(_INNER)).any(axis=1)
+    return seen

@@ -1,0 +1,222 @@
+"""The true surface behind camera triangles: exact points and normals, traced and searched."""
+
+import functools
+from typing import Any
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from mpcam.errors import InputError
+from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.surfaces import Surface
+
+FINE = 40_000
+"""Triangles of the mesh that stands for an analytic surface where rays are traced; points are put on it exactly."""
+_CLOSE = 1e-9
+"""Vertices nearer than this part of the reflector's size are one."""
+_ALIKE = float(np.cos(np.radians(1.0)))
+_CHUNK = 1 << 21
+
+
+class Reflector:
+    """A curved mirror or lens face, ready for questions.
+
+    vertices (V, 3), normals (V, 3), faces (F, 3): the mesh with each vertex once, faces in the order of the mesh that
+    was given; a vertex with several normals (a crease) stays several. A mesh without normals is taken for a smooth
+    surface (`Mesh.flat` gives a facetted one). usable (F,): faces with area and finite corners. center (3,), radius: of
+    a ball around it. surface: the analytic surface, or None. mesh: as given, or made of the surface.
+    """
+
+    def __init__(self, given: Mesh | Surface):
+        self.surface = given if isinstance(given, Surface) else None
+        self.mesh = mesh = given.mesh(FINE) if isinstance(given, Surface) else given
+        corners = mesh.corners
+        with np.errstate(invalid="ignore", over="ignore"):
+            finite = np.isfinite(corners).all(axis=(1, 2))
+            if not finite.any():
+                raise InputError(
+                    f"the reflector has {len(corners)} triangles and none with finite corners: give others"
+                )
+            low, high = corners[finite].min(axis=(0, 1)), corners[finite].max(axis=(0, 1))
+            self.center = 0.5 * low + 0.5 * high
+            self.radius = float(np.linalg.norm(corners[finite] - self.center, axis=-1).max())
+            a, b = (corners[:, i] - corners[:, 0] for i in (1, 2))
+            doubled = np.linalg.norm(np.cross(a / (self.radius or 1.0), b / (self.radius or 1.0)), axis=1)
+        self.usable = finite & (doubled > 1e-18)
+        if not self.usable.any():
+            raise InputError("the reflector has no triangle with an area: give a mesh with one at least")
+        self.areas = np.where(self.usable, 0.5 * doubled, 0.0) * self.radius**2
+        normals = mesh.normals if mesh.normals is None else _usable_normals(mesh)
+        self.vertices, self.normals, self.faces = _welded(mesh, normals, self.usable, self.radius)
+        with np.errstate(invalid="ignore", over="ignore"):
+            self.face_normals = mesh.face_normals
+
+    def at(
+        self, face: np.ndarray, second: np.ndarray, third: np.ndarray, along: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """True points (N, 3) and unit shading normals (N, 3) at weights (N,) of corners 2 and 3 of faces (N,).
+
+        along: (N, 3) directions from the mesh to an analytic surface; default: those of the interpolated normals.
+        """
+        weights = np.stack([1.0 - second - third, second, third], axis=-1)[..., None]
+        corners = self.faces[face]
+        points = (weights * self.vertices[corners]).sum(axis=-2)
+        normals = (weights * self.normals[corners]).sum(axis=-2)
+        if self.surface is not None:
+            points = self.surface.snap(points, normals if along is None else along)
+            return points, self.surface.normal_at(points)
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        return points, np.where(length > 1e-9, normals / np.maximum(length, 1e-9), self.face_normals[face])
+
+    def trace(self, origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """First hits of rays (N, 3): face (N,), -1 for none, distance in lengths of the direction, weights 2 and 3."""
+        origins, directions = np.broadcast_arrays(np.asarray(origins, np.float64), np.asarray(directions, np.float64))
+        scale = self.radius or 1.0
+        origin, length = (origins - self.center) / scale, np.linalg.norm(directions, axis=-1, keepdims=True)
+        along = directions / np.where(length > 0, length, 1.0)
+        # Up to the ball around the reflector in float64: what is left fits into float32 wherever the eye is.
+        skip = np.maximum(-(origin * along).sum(-1, keepdims=True) - 1.5, 0.0)
+        origin = origin + skip * along
+        parts = [
+            self._traced(origin[i : i + _CHUNK], along[i : i + _CHUNK]) for i in range(0, max(len(origin), 1), _CHUNK)
+        ]
+        face, distance, second, third = (np.concatenate(values) for values in zip(*parts, strict=True))
+        distance = (distance + skip[:, 0]) * scale / np.where(length > 0, length, 1.0)[:, 0]
+        return face, np.where(face >= 0, distance, np.inf), second, third
+
+    def _traced(self, origin: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
+        import drjit as dr
+
+        from mpcam.rendering.exclusive import exclusive
+        from mpcam.truth.variant import mitsuba
+
+        @exclusive
+        def run() -> tuple[np.ndarray, ...]:
+            scene, numbers = self._scene
+            with mitsuba() as mi:
+                start, way = (np.ascontiguousarray(values.T, np.float32) for values in (origin, along))
+                found = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(start), mi.Vector3f(way)))
+                hit = found.is_valid()
+                second, third = (dr.select(hit, dr.detach(w), 0.0).numpy().astype(np.float64) for w in found.prim_uv)
+                face = np.where(hit.numpy(), numbers[dr.select(hit, found.prim_index, 0).numpy()], -1)
+                return face, dr.detach(found.t).numpy().astype(np.float64), second, third
+
+        return run() if len(origin) else (np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
+
+    @functools.cached_property
+    def _scene(self) -> tuple[Any, np.ndarray]:
+        """Mitsuba's scene of the usable faces in units of the radius around the centre, and their numbers."""
+        from mpcam.truth.meshes import mitsuba_mesh
+        from mpcam.truth.variant import mitsuba
+
+        places = (self.vertices - self.center) / (self.radius or 1.0)
+        numbers = np.flatnonzero(self.usable)
+        with mitsuba() as mi:
+            shape = mitsuba_mesh(mi, "reflector", np.where(np.isfinite(places), places, 0.0), self.faces[numbers])
+            return mi.load_dict({"type": "scene", "mesh": shape}), numbers
+
+    def sees(self, eye: np.ndarray, points: np.ndarray, slack: float = 1e-4) -> np.ndarray:
+        """Whether nothing of the reflector hides its points (N, 3) from the eye (3,); slack: part of the radius."""
+        way = points - eye
+        _, distance, _, _ = self.trace(eye, way)
+        return (distance - 1.0) * np.linalg.norm(way, axis=-1) > -slack * self.radius
+
+    def closest(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Faces (N,) nearest to points (N, 3) among those on the side of normals (N, 3), and weights 2 and 3 there."""
+        tree, numbers, reach = self._centres
+        count = len(points)
+        face, second, third = np.zeros(count, np.int64), np.zeros(count), np.zeros(count)
+        left, near = np.arange(count), 16
+        while len(left):
+            near = min(near, len(numbers))
+            step = max(_CHUNK // near // 4, 1)
+            done = np.zeros(len(left), bool)
+            for i in range(0, len(left), step):
+                rows = left[i : i + step]
+                away, found = (v.reshape(len(rows), near) for v in tree.query(points[rows], near))
+                candidates = numbers[found]
+                w2, w3, gap = _nearest_in(self.vertices[self.faces[candidates]], points[rows][:, None])
+                fits = (self.face_normals[candidates] * normals[rows][:, None]).sum(-1) > 0
+                everything = near == len(numbers)
+                gap = np.where(fits | (everything & ~fits.any(1, keepdims=True)), gap, np.inf)
+                best = gap.argmin(axis=1)
+                row = np.arange(len(rows))
+                face[rows], second[rows], third[rows] = candidates[row, best], w2[row, best], w3[row, best]
+                done[i : i + step] = everything | (gap[row, best] <= away[:, -1] - reach)
+            left, near = left[~done], near * 4
+        return face, second, third
+
+    @functools.cached_property
+    def _centres(self) -> tuple[KDTree, np.ndarray, float]:
+        numbers = np.flatnonzero(self.usable)
+        corners = self.vertices[self.faces[numbers]]
+        centre = corners.mean(axis=1)
+        return KDTree(centre), numbers, float(np.linalg.norm(corners - centre[:, None], axis=-1).max())
+
+
+@functools.lru_cache(maxsize=8)
+def reflector_of(given: Mesh | Surface) -> Reflector:
+    """The prepared reflector; the eight used last are kept. Raises InputError for anything else, and empty meshes."""
+    if not isinstance(given, (Mesh, Surface)):
+        raise InputError(f"the reflector is a {type(given).__name__}: give a Mesh or a Surface, e.g. Surface.sphere()")
+    return Reflector(given)
+
+
+def _usable_normals(mesh: Mesh) -> np.ndarray:
+    """The mesh's unit normals, with smooth ones in place of those that are zero or not finite."""
+    assert mesh.normals is not None
+    with np.errstate(invalid="ignore"):
+        length = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
+        bad = ~(np.isfinite(length) & (length > 1e-12))
+    return np.where(bad, mesh.smooth_normals(), mesh.normals / np.where(bad, 1.0, length))
+
+
+def _welded(
+    mesh: Mesh, normals: np.ndarray | None, usable: np.ndarray, size: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, normals and faces with one vertex where positions, and normals to a degree, are the same."""
+    places = np.where(np.isfinite(mesh.vertices), mesh.vertices, 0.0)
+    _, group = np.unique(np.rint(places / (_CLOSE * (size or 1.0))), axis=0, return_inverse=True)
+    group = group.ravel()
+    faces = mesh.faces
+    if normals is None:
+        merged = np.zeros((group.max() + 1, 3))
+        merged[group] = places
+        return merged, Mesh(merged, group[faces][usable]).smooth_normals(), group[faces].astype(np.int32)
+    number, left, count = np.full(len(group), -1), np.arange(len(group)), 0
+    while len(left):
+        # The first vertex of each place, with all there that have its normal.
+        groups, first = np.unique(group[left], return_index=True)
+        leader = np.zeros(group.max() + 1, np.int64)
+        leader[groups] = left[first]
+        lead = leader[group[left]]
+        same = ((normals[left] * normals[lead]).sum(axis=1) >= _ALIKE) | (left == lead)
+        order = np.zeros(group.max() + 1, np.int64)
+        order[groups] = np.arange(count, count + len(groups))
+        number[left[same]] = order[group[left[same]]]
+        left, count = left[~same], count + len(groups)
+    vertices, joined = np.zeros((count, 3)), np.zeros((count, 3))
+    vertices[number], joined[number] = places, normals
+    return vertices, joined, number[faces].astype(np.int32)
+
+
+def _nearest_in(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights 2 and 3, and distance, of the nearest points of triangles (..., 3, 3) to points (..., 3)."""
+    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
+    ab, ac, ap = b - a, c - a, points - a
+    d11, d12, d22 = (ab * ab).sum(-1), (ab * ac).sum(-1), (ac * ac).sum(-1)
+    e1, e2 = (ab * ap).sum(-1), (ac * ap).sum(-1)
+    whole = np.maximum(d11 * d22 - d12 * d12, 1e-300)
+    u, v = (d22 * e1 - d12 * e2) / whole, (d11 * e2 - d12 * e1) / whole
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1)
+    on_ab = np.clip(e1 / np.maximum(d11, 1e-300), 0, 1)
+    on_ac = np.clip(e2 / np.maximum(d22, 1e-300), 0, 1)
+    bc, bp = c - b, points - b
+    on_bc = np.clip((bc * bp).sum(-1) / np.maximum((bc * bc).sum(-1), 1e-300), 0, 1)
+    best_u, best_v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
+    gap = np.where(inside, np.linalg.norm(ap - u[..., None] * ab - v[..., None] * ac, axis=-1), np.inf)
+    for s, t in ((on_ab, 0.0 * on_ab), (0.0 * on_ac, on_ac), (1.0 - on_bc, on_bc)):
+        away = np.linalg.norm(ap - s[..., None] * ab - t[..., None] * ac, axis=-1)
+        nearer = away < gap
+        best_u, best_v, gap = np.where(nearer, s, best_u), np.where(nearer, t, best_v), np.where(nearer, away, gap)
+    return best_u, best_v, gap
