@@ -24,12 +24,16 @@ if TYPE_CHECKING:
     from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
+    from mpcam.decomposition.chained import Chained as Chained
+    from mpcam.decomposition.chained import chained as chained
     from mpcam.decomposition.decompose import decompose as decompose
     from mpcam.decomposition.decompose import subdivided as subdivided
     from mpcam.decomposition.ray_error import RayError as RayError
     from mpcam.decomposition.ray_error import ray_error as ray_error
     from mpcam.decomposition.resolve import Resolver as Resolver
     from mpcam.decomposition.resolve import resolve as resolve
+    from mpcam.effects.caustics import Caustics as Caustics
+    from mpcam.effects.caustics import caustics as caustics
     from mpcam.effects.environment import EnvironmentMap as EnvironmentMap
     from mpcam.effects.environment import environment_map as environment_map
     from mpcam.effects.occlusion import ambient_occlusion as ambient_occlusion
@@ -38,6 +42,9 @@ if TYPE_CHECKING:
     from mpcam.effects.reflection import reflection as reflection
     from mpcam.effects.shadows import ShadowMap as ShadowMap
     from mpcam.effects.shadows import shadow_map as shadow_map
+    from mpcam.effects.visualization import Unrolled as Unrolled
+    from mpcam.effects.visualization import surround as surround
+    from mpcam.effects.visualization import unrolled as unrolled
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
     from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
@@ -79,13 +86,16 @@ _HOMES = {
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
+    "mpcam.decomposition.chained": "Chained chained",
     "mpcam.decomposition.decompose": "decompose subdivided",
     "mpcam.decomposition.ray_error": "RayError ray_error",
     "mpcam.decomposition.resolve": "Resolver resolve",
+    "mpcam.effects.caustics": "Caustics caustics",
     "mpcam.effects.environment": "EnvironmentMap environment_map",
     "mpcam.effects.occlusion": "ambient_occlusion form_factor",
     "mpcam.effects.reflection": "Reflection reflection",
     "mpcam.effects.shadows": "ShadowMap shadow_map",
+    "mpcam.effects.visualization": "Unrolled surround unrolled",
     "mpcam.errors": "InputError SetupError",
     "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
     "mpcam.geometry.load": "load_mesh",

@@ -1,23 +1,23 @@
 """The command line: parse, call, print. Everything that it does can be done from Python too."""
 
 import csv
-import json
 import os
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
 import mpcam
+from mpcam.cli_common import check_machine, image_size, load, print_json
+from mpcam.cli_mirrors import caustics, decompose, surround
 from mpcam.errors import InputError, SetupError
 from mpcam_kernels.backend import BackendError
 
 if TYPE_CHECKING:
-    from mpcam.io.scenes import SceneFile
+    pass
 
 EXIT_FAILURE, EXIT_INPUT, EXIT_INTERRUPT = 1, 2, 130
 
@@ -88,17 +88,17 @@ def compare(
     if demo and methods:
         raise InputError("--methods does not go with --demo, which compares all: give a scene")
     console = Console(quiet=quiet or json, width=None if sys.stdout.isatty() else WIDTH)
-    _check_machine()
+    check_machine()
     if demo:
-        width, height = _size(size) if size else (SIZE, SIZE)
+        width, height = image_size(size) if size else (SIZE, SIZE)
         if width != height:
             raise InputError(f"--size {size}: the demo is square, give one number")
         rounds: dict[str, Any] = {} if repeats is None else {"repeats": repeats}
         results = run_demo(output or Path("out/demo"), size=width, console=console, **rounds)
         if json:
-            _print_json([result.to_dict() for result in results])
+            print_json([result.to_dict() for result in results])
         return
-    loaded = _load(str(scene), size)
+    loaded = load(str(scene), size)
     asked = loaded.compare
     names = asked.methods if methods is None else tuple(name.strip() for name in methods.split(","))
     options: dict[str, Any] = {"shading": asked.shading, "repeats": asked.repeats if repeats is None else repeats}
@@ -114,7 +114,7 @@ def compare(
             **{name: value for name, value in options.items() if value is not None},
         )
     if json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
         return
     print_comparison(result, console)
     console.print(f"Report: {folder / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
@@ -172,8 +172,8 @@ def render(
     layers = format_of(output).layers
     if shadow_size is not None and not shadows:
         raise InputError(f"--shadow-size {shadow_size} goes with --shadows: give that too")
-    _check_machine()
-    loaded = _load(scene, size).scene
+    check_machine()
+    loaded = load(scene, size).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
     asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull, "triangles": triangles}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
@@ -201,6 +201,10 @@ def render(
         write_image(output, image, **({"depth": hits.depth, "camera": camera} if layers else {}))
 
 
+for command in (decompose, caustics, surround):
+    app.command(command)
+
+
 @app.command
 def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=True)], /, *, json: bool = False) -> None:
     """Project points into the image: a row each with the number of the point, pixel (u right, v down), depth, valid.
@@ -220,7 +224,7 @@ def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=Tr
     ]
     if json:
         keys = ("u", "v", "depth")
-        _print_json([[None if image is None else dict(zip(keys, image, strict=True)) for image in row] for row in rows])
+        print_json([[None if image is None else dict(zip(keys, image, strict=True)) for image in row] for row in rows])
         return
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(["point", "u", "v", "depth", "valid"])
@@ -234,7 +238,7 @@ def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json
     """Run a camera model on its stiff and extreme cases, against 50 digits and dense sampling.
 
     Args:
-        model: radial.
+        model: radial, camera-triangles.
         triangles: Random triangles per camera whose boxes are checked.
         points: Points per camera and kind whose images are checked.
         json: Print the cases as JSON.
@@ -246,12 +250,12 @@ def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json
 
     if model not in MODELS:
         raise InputError(f"stress {model!r}: allowed are {', '.join(MODELS)}")
-    _check_machine()
+    check_machine()
     chosen = suite(model)
     with bar(Console(stderr=True), f"stress {model}") as progress:
         cases = chosen.run(triangles, points, progress)
     if json:
-        _print_json(report.as_dicts(cases))
+        print_json(report.as_dicts(cases))
     else:
         report.print_cases(cases, chosen.LIMIT, Console(width=None if sys.stdout.isatty() else 110))
     return 0 if all(case.good(chosen.LIMIT) for case in cases) else EXIT_FAILURE
@@ -290,16 +294,16 @@ def experiment(
             raise InputError(f"experiment: say which, one of {', '.join(EXPERIMENTS)}")
         print_experiments(console)
         if json:
-            _print_json([{"name": known.name, "summary": known.summary} for known in EXPERIMENTS.values()])
+            print_json([{"name": known.name, "summary": known.summary} for known in EXPERIMENTS.values()])
         return
     if name not in EXPERIMENTS:
         raise InputError(f"experiment {name!r}: allowed are {', '.join(EXPERIMENTS)}")
-    _check_machine()
+    check_machine()
     folder = output or Path("out") / name
     with bar(Console(stderr=True, quiet=quiet), name) as progress:
         report = run(name, repeats=repeats, quick=quick, output=folder, progress=progress)
     if json:
-        _print_json(report.to_dict())
+        print_json(report.to_dict())
         return
     print_report(report, console)
     console.print(f"Report: {folder / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
@@ -319,39 +323,10 @@ def doctor(*, json: bool = False) -> int:
     with Console(stderr=True).status("asking each part in a process of its own"):
         checks = examine()
     if json:
-        _print_json(report(checks))
+        print_json(report(checks))
     else:
         Console(width=None if sys.stdout.isatty() else 100).print(table(checks))
     return 0 if is_fit(checks) else EXIT_FAILURE
-
-
-def _load(name: str, size: str | None) -> "SceneFile":
-    from mpcam.cameras.change import resized
-    from mpcam.io.scenes import load_scene
-
-    loaded = load_scene(name)
-    if size is None:
-        return loaded
-    return replace(loaded, scene=replace(loaded.scene, camera=resized(loaded.scene.camera, *_size(size))))
-
-
-def _size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,6})(?:x(\d{1,6}))?", text.strip().lower())
-    if not found or 0 in (size := (int(found[1]), int(found[2] or found[1]))):
-        raise InputError(f"--size {text}: give the width and height in pixels, as 640x480 or 512")
-    return size
-
-
-def _check_machine() -> None:
-    from mpcam.doctor import check_llvm
-    from mpcam_kernels.backend import backend_name
-
-    if backend_name() == "llvm":
-        check_llvm()
-
-
-def _print_json(data: Any) -> None:
-    print(json.dumps(data, indent=2, allow_nan=False))
 
 
 def _complain(error: object, status: int) -> int:

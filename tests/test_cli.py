@@ -46,7 +46,7 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("frobnicate", "compare, render, project, stress, experiment, doctor"),
+        ("frobnicate", "compare, render, decompose, caustics, surround, project"),
         ("render", "SCENE"),
         ("render cube", "--output"),
         ("render cube --output a.png --frobnicate", "--frobnicate"),

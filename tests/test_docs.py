@@ -142,7 +142,7 @@ def unknown_names(thing: object) -> list[str]:
     known = set()
     if not inspect.isclass(thing) or not issubclass(thing, BaseException):
         known |= set(inspect.signature(thing).parameters)  # pyright: ignore[reportArgumentType]
-    known |= set(dir(thing)) if inspect.isclass(thing) else set()
+    known |= {*dir(thing), *inspect.get_annotations(thing)} if inspect.isclass(thing) else set()
     parts = load_docstrings().take_apart(inspect.getdoc(thing) or "")
     return [name for entry in parts.entries for name in entry.names if name not in known]
 

@@ -20,6 +20,9 @@ SLACK = 4.0
 LARGEST_SLACK = 2.0**-10
 """The same at most, as a weight, and as a fraction of the distance."""
 
+UNCERTAIN = 0.25
+"""Weights that rounding may change by this much are no image: slits, centres and the like."""
+
 RESIDUAL = 64.0
 """Largest |p + c D - q| of an image, component by component, in units of eps times the sum of the magnitudes."""
 
@@ -72,7 +75,9 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     corners, rays, point = given[:3], given[3:6], given[6]
     fixed = [tuple(detach(x) for x in row) for row in given]
     frame = _Scaled(fixed[:3], fixed[3:6], fixed[6])
-    roots = cubic_roots(*determinant_cubic(frame.a, frame.d), -LARGEST_SLACK, 1.0 / frame.eps)
+    k, centre = determinant_cubic(frame.a, frame.d)
+    roots = cubic_roots(*k, -LARGEST_SLACK - centre, 1.0 / frame.eps - centre)
+    roots = [Root(centre + root, exists) for root, exists in roots]
     some = fine & (frame.longest > 0) & (frame.farthest > 0)
 
     def images(x: Array, exists: Array, others: list[Root]) -> Image:
@@ -94,27 +99,29 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     return one, two, three
 
 
-def inside(w1: Array, w2: Array, slack: Array | float = 0.0) -> Array:
-    """Whether weights are those of a point in the triangle, up to a slack."""
-    return (w1 >= -slack) & (w2 >= -slack) & (1.0 - w1 - w2 >= -slack)
+def inside(w1: Array, w2: Array, slack: Triple | Array = 0.0) -> Array:
+    """Whether weights are those of a point in the triangle, up to a slack, one for all three or one for each."""
+    s1, s2, s3 = slack if isinstance(slack, tuple) else (slack, slack, slack)
+    return (w1 >= -s1) & (w2 >= -s2) & (1.0 - w1 - w2 >= -s3)
 
 
 class _Guess(NamedTuple):
-    """Unknowns near a solution, Newton's step for them, not yet taken, and how far rounding carries.
+    """Unknowns near a solution, what Newton's step for them takes, and how far rounding carries.
 
-    rows: of the inverse of the derivatives of the sum below; zero on folds. error: largest
-    component of that sum, relative to its terms. slack, slack_x: what is forgiven. direct: the ray has a direction.
+    value: the sum below. rows: of the inverse of its derivatives; zero on folds. error: largest component of the sum,
+    relative to its terms. slack, slack_x: what is forgiven. sound: the ray has a direction, and the weights are more
+    than rounding.
     """
 
     w1: Array
     w2: Array
     x: Array
     rows: tuple[Triple, Triple, Triple]
-    steps: Triple
+    value: Triple
     error: Array
-    slack: Array
+    slack: Triple
     slack_x: Array
-    direct: Array
+    sound: Array
 
 
 class _Scaled:
@@ -138,7 +145,9 @@ class _Scaled:
         """The weights at a root of the cubic, polished together with it, and whether they are an image."""
 
         def step(now: _Guess) -> _Guess:
-            trial = self.guess(*(u - step for u, step in zip(now[:3], now.steps, strict=True)))
+            # From a value that is held: a compiler that works it out anew for each row, with other roundings, would
+            # spoil what is left of the rows' difference.
+            trial = self.guess(*(u - _dot(row, now.value) for u, row in zip(now[:3], now.rows, strict=True)))
             # The first steps may lead away; as long as there is no image yet, they are not held to every one.
             better = (trial.error <= now.error) | (
                 (now.error > 0.5 * RESIDUAL * self.eps) & (trial.error <= AWAY * now.error)
@@ -150,12 +159,12 @@ class _Scaled:
         w1, w2 = self.weights(x)
         zero = 0.0 * (w1 + w2 + x)
         zeros, no = (zero, zero, zero), zero > 1.0
-        blank = _Guess(w1 + zero, w2 + zero, x + zero, (zeros, zeros, zeros), zeros, zero + 1e9, zero, zero, no)
+        blank = _Guess(w1 + zero, w2 + zero, x + zero, (zeros, zeros, zeros), zeros, zero + 1e9, zeros, zero, no)
         now = repeat(step, blank, POLISH + 1)
         normal, _, _, alpha, beta = self.plane(now.x)
         spread = [_largest(self.e[i]) + absolute(now.x) * _largest(self.f[i]) for i in range(2)]
         flat = _largest(normal) <= COLLAPSED * self.eps * (spread[0] / alpha + spread[1] / beta)
-        valid = exists & ~flat & now.direct & (now.error <= RESIDUAL * self.eps)
+        valid = exists & ~flat & now.sound & (now.error <= RESIDUAL * self.eps)
         return now, valid & inside(now.w1, now.w2, now.slack) & (now.x >= -now.slack_x)
 
     def plane(self, x: Array) -> tuple[Triple, Triple, Triple, Array, Array]:
@@ -174,7 +183,7 @@ class _Scaled:
         return minimum(maximum(w1, -FAR), FAR), minimum(maximum(w2, -FAR), FAR)
 
     def guess(self, w1: Array, w2: Array, x: Array) -> _Guess:
-        """Newton's step from here."""
+        """What is known here."""
         w = (w1, w2, 1.0 - w1 - w2)
         terms = [_along(self.a[i], x, self.d[i]) for i in range(3)]
         value = _weighted(w, terms)
@@ -195,14 +204,17 @@ class _Scaled:
             _times(normal, per_det / gamma),
         )
         forgiven = SLACK * self.eps
-        carried = [forgiven * _dot(_absolute(row), size) for row in rows]
+        third = _times(_plus(rows[0], rows[1]), -1.0)
+        carried = [forgiven * _dot(_absolute(row), size) for row in (rows[0], rows[1], third, rows[2])]
+        s1, s2, s3, s4 = [minimum(forgiven + x, LARGEST_SLACK) for x in carried]
         relative = [absolute(u) / where(s > 0, s, 1.0) for u, s in zip(value, bound, strict=True)]
         return _Guess(
-            *(w1, w2, x, rows, (_dot(rows[0], value), _dot(rows[1], value), _dot(rows[2], value))),
+            *(w1, w2, x, rows, value),
             error=maximum(maximum(relative[0], relative[1]), relative[2]),
-            slack=minimum(forgiven + maximum(carried[0], carried[1]), LARGEST_SLACK),
-            slack_x=minimum(forgiven + carried[2], LARGEST_SLACK),
-            direct=_largest(direction) > COLLAPSED * self.eps * longest,
+            slack=(s1, s2, s3),
+            slack_x=s4,
+            sound=(_largest(direction) > COLLAPSED * self.eps * longest)
+            & (maximum(carried[0], carried[1]) < UNCERTAIN),
         )
 
 

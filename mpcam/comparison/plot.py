@@ -31,7 +31,8 @@ ERRORS = ("flip", "projection_median", "ray_angle")
 def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ERRORS) -> None:
     """Write a PNG with a row of log-log panels for each error, one for each time that was measured, with the front.
 
-    Errors that no row has get no panel. Errors of zero have no place on a log axis: they stand in a band marked 0 below the smallest decade.
+    Errors that no row has get no panel. Errors of zero have no place on a log axis: they stand in a band marked 0
+    below the smallest decade.
     """
     import matplotlib.style
 

@@ -35,6 +35,11 @@ class Resolver:
     a common centre, and other filters.
     """
 
+    mask: np.ndarray
+    triangle: np.ndarray
+    direction: np.ndarray
+    points: np.ndarray
+
     def __init__(self, cams: CameraTriangles, reflector: Mesh | Surface, camera: Camera, filter: str = "linear"):
         if not isinstance(cams, CameraTriangles):
             raise InputError(f"cams is a {type(cams).__name__}: give CameraTriangles, e.g. from mpcam.decompose")

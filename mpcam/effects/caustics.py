@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.chained import Chained, chained
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.reflector import reflector_of
@@ -62,6 +63,9 @@ class Caustics:
     chained: those behind them, of a lens with two faces, or None.
     """
 
+    cams: CameraTriangles
+    chained: Chained | None
+
     @exclusive
     def __init__(
         self, scene: Scene, reflector: Mesh | Surface, light: PointLight, camera: Camera, settings: "Settings"
@@ -84,7 +88,7 @@ class Caustics:
     def _shine(self) -> None:
         """Photons of the light where it is, and the camera triangles that they go through."""
         settings, behind = self.settings, None
-        self.chained: Chained | None = None
+        self.chained = None
         if settings.back is not None and settings.index is not None:
             self.chained = chained(self.cams, settings.back, 1.0 / settings.index, reflector=self._given)
             behind = self.chained, reflector_of(settings.back)

@@ -127,6 +127,10 @@ class Unrolled:
     before it begins again. pixel: (height, width) atlas pixel, row by row, of each; no pixel is mixed from others.
     """
 
+    width: int
+    height: int
+    pixel: np.ndarray
+
     def __init__(self, cams: CameraTriangles):
         grid, atlas = grid_of(cams), cams.atlas
         step = grid.side - 1

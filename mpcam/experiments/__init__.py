@@ -48,6 +48,21 @@ EXPERIMENTS = {
             "Time and peak memory against the number of triangles and of pixels, next to ray tracing",
         ),
         Experiment(
+            "hou2006-table1",
+            "hou2006_table1",
+            "Hou et al. 2006, Table 1: overdraw of camera triangles by bound; frames against rebuilding and tracing",
+        ),
+        Experiment(
+            "hou2006-fig6",
+            "hou2006_fig6",
+            "Hou et al. 2006, Figs. 1 and 6: quality against tessellation, environment maps and ray tracing beside",
+        ),
+        Experiment(
+            "hou2006-fig7",
+            "hou2006_fig7",
+            "Hou et al. 2006, Fig. 7: many moving objects around a teapot, with and without each acceleration",
+        ),
+        Experiment(
             "leaving-out",
             "leaving_out",
             "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",

@@ -26,6 +26,17 @@ def read_points(source: str | Path) -> np.ndarray:
         raise InputError(f"{source}: is not text: give rows of x, y, z") from None
 
 
+def read_point(text: str, name: str) -> np.ndarray:
+    """One point (3,) from text like "1,0,2.5"; `name` says in errors what it is for."""
+    try:
+        point = np.array([float(cell) for cell in text.replace(",", " ").split()])
+    except ValueError:
+        point = np.zeros(0)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise InputError(f"{name} {text}: give three numbers, as 1,0,2.5")
+    return point
+
+
 def parse_points(lines: Iterable[str], name: str) -> np.ndarray:
     """Points (N, 3) from rows of text; `name` says in errors where they are from. See read_points."""
     points = []

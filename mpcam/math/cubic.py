@@ -94,7 +94,7 @@ def _piece(k: list[Array], anchor: Array, end: Array, distance: Array) -> tuple[
     """The root between an anchor and the end of its monotone piece, at most `distance` away, and whether there is one.
 
     With s the distance from the anchor, |f(s) - f(0)| is about slope s + bend s^2 + |k3| s^3; the least s at which one
-    term makes up for |f(0)| is between half and twice the root, and above 1 / 1.3 of it.
+    term makes up for |f(0)| is at most twice the root, and 1.3 times it is above the root.
     """
     start, stop = polynomial(k, anchor), polynomial(k, end)
     exists = (anchor != end) & _opposite(start, stop)
@@ -139,19 +139,31 @@ def _differentiable(k: tuple[Array, ...], x: Array, exists: Array) -> Array:
     return where(steep, x - (step - detach(step)), x)
 
 
-def determinant_cubic(a: Sequence[Vector], d: Sequence[Vector]) -> tuple[Array, Array, Array, Array]:
-    """Coefficients k0..k3 of det[a_i + x d_i] for three vectors each, exact but for the last rounding.
+def determinant_cubic(a: Sequence[Vector], d: Sequence[Vector]) -> tuple[tuple[Array, Array, Array, Array], Array]:
+    """Coefficients of det[a_i + (centre + t) d_i] in t, for three vectors each, and the centre.
 
     Their terms cancel where the vectors are nearly parallel or in one plane, and then they would be lost in rounding
     although the roots are not; so every number here is a pair, of a value and of what rounding took from it (Dekker
-    1971). No vectors of numbers are formed, so components may broadcast.
+    1971), and only the results are rounded. The centre is 0, or the inflection if all three roots are near it, as they
+    are where rays nearly meet. No vectors of numbers are formed, so components may broadcast.
     """
     e, f = [[[_difference(x, y) for x, y in zip(m[i], m[2], strict=True)] for i in range(2)] for m in (a, d)]
     tail_a, tail_d = [[(x, 0.0 * x) for x in m[2]] for m in (a, d)]
     n0, n2 = _cross(e[0], e[1]), _cross(f[0], f[1])
     n1 = [_add(x, y) for x, y in zip(_cross(e[0], f[1]), _cross(f[0], e[1]), strict=True)]
+    k0, k3 = _dot(n0, tail_a), _dot(n2, tail_d)
     k1, k2 = _add(_dot(n1, tail_a), _dot(n0, tail_d)), _add(_dot(n2, tail_a), _dot(n1, tail_d))
-    return _dot(n0, tail_a)[0], k1[0], k2[0], _dot(n2, tail_d)[0]
+    spread = absolute(k2[0] * k2[0] - 3 * k1[0] * k3[0])
+    near = (spread < k2[0] * k2[0] / 64) & (absolute(k2[0]) < 1e3 * absolute(k3[0]))
+    centre = where(near, -k2[0] / where(near, 3 * k3[0], 1.0), 0.0)
+    shift = (centre, 0.0 * centre)
+    k2 = _add(k2, _multiply(k3, shift))
+    k1 = _add(k1, _multiply(k2, shift))
+    k0 = _add(k0, _multiply(k1, shift))
+    k2 = _add(k2, _multiply(k3, shift))
+    k1 = _add(k1, _multiply(k2, shift))
+    k2 = _add(k2, _multiply(k3, shift))
+    return (k0[0], k1[0], k2[0], k3[0]), centre
 
 
 def _sum(x: Array, y: Array) -> Pair:

@@ -168,7 +168,7 @@ def _quadratic(p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     p, q = p / unit, q / unit / unit
     root = np.sqrt(p * p - 4 * q)
     # Without cancellation; real roots where p and q are real.
-    sign = np.where((p.conj() * root).real >= 0, 1, -1)
+    sign = np.where(np.real(np.conj(p) * root) >= 0, 1, -1)
     large = -0.5 * (p + sign * root)
     small = np.where(large != 0, q / np.where(large != 0, large, 1), 0)
     return large * unit, small * unit

@@ -76,7 +76,7 @@ class Bundled:
     def run(self, done: Callable[[str, Any], None] | None = None, count: bool = False) -> tuple[Any, Any]:
         """Keys of all places, and counters or None; done(stage, arrays) is told of each stage."""
         from mpcam_kernels.backend import backend_name
-        from mpcam_kernels.bundle_pipeline import Task
+        from mpcam_kernels.candidates import Task
 
         rays, (names, faces, counts) = self.rays, self.tree
         kernels = _pipeline(self.bound, self.output, self.culling, rays.layout.blocks, count, backend_name())

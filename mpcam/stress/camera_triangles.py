@@ -214,6 +214,8 @@ def _fold_reach(v: Any, d: Any, q: Any, k: list[Any], root: Any, other: Any, eps
     error = mpmath.mpf(0)
     for i in range(3):
         error += _dot(_size(_cross(swept[(i + 1) % 3], swept[i - 1])), sizes[i])
+        # Two errors at once, which is all there is where the swept triangle has no area.
+        error += 4 * LIMIT * eps * max(_size(swept[i])) * max(sizes[(i + 1) % 3]) * max(sizes[i - 1])
     # Three roots in one place: the third derivative takes over.
     twist = abs(second[0]) if degree == 3 else mpmath.mpf(0)
     bend = max(bend, twist * abs(root - other))

@@ -1,0 +1,168 @@
+"""The commands around camera triangles: decompose, caustics, surround."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from mpcam.cli_common import check_machine, load, print_json
+from mpcam.errors import InputError
+
+
+def decompose(
+    scene: str,
+    /,
+    *,
+    output: Path,
+    eye: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    triangles: int | None = None,
+    resolution: int | None = None,
+    directions: bool = False,
+    json: bool = False,
+) -> None:
+    """Cut the scene's mirror into camera triangles, write them as a camera in JSON, and say how far their rays are off.
+
+    Args:
+        scene: TOML file with a mirror, or a mesh file that is the mirror.
+        output: JSON file for the camera.
+        eye: Point x,y,z that looks into the mirror; the scene's camera if not given.
+        triangles: How many at most; those of the scene's mirror, or 104.
+        resolution: Pixels along the short sides of each; those of the scene's mirror, or 64.
+        directions: Bend rays at the vertices only.
+        json: Print the errors as JSON.
+    """
+    from dataclasses import asdict
+
+    from mpcam.cameras.serialize import camera_to_json
+    from mpcam.decomposition.decompose import decompose as cut
+    from mpcam.decomposition.ray_error import ray_error
+    from mpcam.geometry.mirror import Mirror
+    from mpcam.io.atomic import atomic_path
+    from mpcam.io.points import read_point
+
+    check_machine()
+    loaded = load(scene, None).scene
+    mirror = loaded.mirror or Mirror(loaded.mesh)
+    seen: Any = loaded.camera if eye is None else read_point(eye, "--eye")
+    cams = cut(
+        mirror.surface,
+        seen,
+        triangles or mirror.triangles,
+        resolution=resolution or mirror.resolution,
+        index=mirror.index,
+        mode="directions" if directions else "normals",
+    )
+    found = ray_error(cams, mirror.surface, seen)
+    with atomic_path(output) as file:
+        file.write_text(camera_to_json(cams) + "\n", encoding="utf-8")
+    if json:
+        print_json({"triangles": cams.count, "width": cams.width, "height": cams.height} | asdict(found))
+        return
+    print(f"{cams.count} camera triangles, {cams.width} x {cams.height} pixels: {output}")
+    print(
+        f"rays off by {found.angle_rms:.3g} mrad (root mean square); at {found.distance:.3g} scene units by "
+        f"{found.rms:.3g}, median {found.median:.3g}, 95 % below {found.p95:.3g}"
+    )
+
+
+def caustics(
+    scene: str,
+    /,
+    *,
+    output: Path,
+    size: str | None = None,
+    triangles: int = 400,
+    resolution: int = 64,
+    photons: int = 512,
+    radius: float = 2.0,
+) -> None:
+    """Render a scene with the caustics that its mirror, or interface, throws of its first point light.
+
+    Args:
+        scene: TOML file with a mirror and a point light.
+        output: Image file: .png, .exr and others.
+        size: Image size in pixels, as 640x480 or 512.
+        triangles: Camera triangles as the light sees the mirror.
+        resolution: Pixels along the short sides of each.
+        photons: Pixels along a side of the light's view.
+        radius: Pixels that a photon is spread over, 0 to 8.
+    """
+    from rich.console import Console
+
+    from mpcam.effects.caustics import caustics as cast
+    from mpcam.geometry.scene import PointLight
+    from mpcam.io.image_formats import format_of
+    from mpcam.io.images import write_image
+
+    format_of(output)
+    check_machine()
+    loaded = load(scene, size).scene
+    light = next((one for one in loaded.lights if isinstance(one, PointLight)), None)
+    if loaded.mirror is None or light is None:
+        raise InputError(f"{scene}: caustics need a [mirror] and a [[light]] of type point: give the scene both")
+    settings: dict[str, Any] = {"triangles": triangles, "resolution": resolution, "photons": photons, "radius": radius}
+    mirror = loaded.mirror
+    with Console(stderr=True).status(f"caustics of {loaded.name}"):
+        found = cast(
+            loaded, mirror.surface, light, loaded.camera, index=mirror.index, reflectance=mirror.color, **settings
+        )
+        write_image(output, found.render())
+
+
+def surround(
+    scene: str,
+    /,
+    *,
+    output: Path,
+    centre: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,1",
+    radius: float = 2.0,
+    height: float = 2.0,
+    columns: int = 20,
+    rows: int = 10,
+    resolution: int = 64,
+    outward: bool = False,
+    slant: float = 0.0,
+    shading: str = "light",
+) -> None:
+    """Show all sides of something in one picture, through a strip of camera triangles around it.
+
+    Args:
+        scene: TOML file, mesh file or name of a built-in scene.
+        output: Image file: .png, .exr and others.
+        centre: Middle of the strip, x,y,z.
+        radius: Of the strip, scene units.
+        height: Of the strip, scene units.
+        columns: Cells around, two camera triangles each.
+        rows: Cells above each other.
+        resolution: Pixels along a cell.
+        outward: Look away from the middle.
+        slant: Degrees that rays are tilted up.
+        shading: light, color, normal or texture.
+    """
+    import math
+
+    from rich.console import Console
+
+    from mpcam.effects.visualization import surround as strip
+    from mpcam.effects.visualization import unrolled
+    from mpcam.io.image_formats import format_of
+    from mpcam.io.images import write_image
+    from mpcam.io.points import read_point
+    from mpcam.rendering.methods import rasterize
+    from mpcam.rendering.shade import shade
+
+    format_of(output)
+    check_machine()
+    loaded = load(scene, None).scene
+    cams = strip(
+        read_point(centre, "--centre"),
+        radius,
+        height,
+        columns,
+        rows,
+        inward=not outward,
+        slant=math.radians(slant),
+        resolution=resolution,
+    )
+    with Console(stderr=True).status(f"all around in {loaded.name}"):
+        write_image(output, unrolled(cams, shade(rasterize(cams, loaded.mesh), loaded, shading)))
