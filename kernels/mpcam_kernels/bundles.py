@@ -44,6 +44,11 @@ class Cones:
 
     rows: Rows
 
+    @property
+    def items(self) -> int:
+        """How many there are."""
+        return dr.width(self.rows.flat) // (4 * self.rows.count)
+
     def __call__(self, types: Any, number: Any, active: Any = True) -> tuple[Any, Any]:
         """The two rows of cones by number."""
         first, second = self.rows.at(types, number, active)

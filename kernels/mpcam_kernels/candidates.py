@@ -14,6 +14,7 @@ from mpcam_kernels.lanes import lanes
 from mpcam_kernels.rows import Rows, room
 
 LANES = 1 << 22  # at a time
+FLAT = 1 << 18  # pairs of a block and a triangle that are looked at without groups
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
 CULLING = ("objects", "triangles")
 
@@ -65,7 +66,9 @@ class Candidates:
         tell(stage, arrays) is told after each step.
         """
         bundle, top = task.bundle, len(levels) - 1
-        bundles = dr.width(cones.rows.flat) // (4 * cones.rows.count)
+        if split and top == 0 and bundle.cones.items * task.counts[0] <= FLAT:
+            cones, split = bundle.cones, False
+        bundles = cones.items
 
         def down(level: int, groups: bool, pairs: Pairs, number: int) -> Iterator[tuple[Pairs, int]]:
             if level == 0 and not groups:

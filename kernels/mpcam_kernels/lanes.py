@@ -6,7 +6,7 @@ from typing import Any
 import drjit as dr
 
 
-@functools.lru_cache(maxsize=6)
+@functools.lru_cache(maxsize=12)
 def lanes(types: Any, first: int, last: int) -> Any:
     """UInt first, ..., last - 1, evaluated; kept for a while, since most frames want what the frame before wanted."""
     numbers = dr.arange(types.UInt, first, last)

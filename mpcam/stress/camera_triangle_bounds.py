@@ -4,6 +4,7 @@ The oracle tests every pixel against every triangle, without any bound; what cou
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:
     place = dr.arange(t.UInt, dr.width(rays.rows.flat) // 8)
     each = rays.at(t, place)
 
-    def step(number: object, hits: object) -> tuple[object, object]:
+    def step(number: Any, hits: Any) -> tuple[Any, Any]:
         corners = [dr.gather(t.UInt, faces, number * 3 + k) for k in range(3)]
         shape = skew.setup(*(dr.gather(t.Array3f, vertices, corner) for corner in corners))
         covered = skew.inside(shape, each) & shape.usable
@@ -109,5 +110,5 @@ def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:
     count = mesh.triangle_count
     start = t.UInt(0) + place * 0, t.UInt(0) + place * 0
     _, hits = dr.while_loop(start, lambda number, hits: number < count, step)
-    total: object = dr.sum(t.UInt64(hits))
-    return int(total[0])  # pyright: ignore[reportIndexIssue]
+    total: Any = dr.sum(t.UInt64(hits))
+    return int(total[0])

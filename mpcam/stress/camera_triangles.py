@@ -28,7 +28,8 @@ Inputs = tuple[np.ndarray, np.ndarray, np.ndarray]
 def run(triangles: int = 1_000_000, points: int = 200, progress: Progress | None = None) -> list[Case]:
     """All cases, `points` of each kind and precision. Raises InputError below 1.
 
-    triangles: not used yet; the bounds of scene triangles will be checked with it.
+    triangles: how many pairs of a camera triangle and a scene triangle are looked at for each kind of rays, to find
+    pixels that a bound leaves out.
     """
     if triangles < 1 or points < 1:
         raise InputError(f"stress: triangles={triangles}, points={points}: at least 1 of each is needed")
