@@ -239,7 +239,7 @@ def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json
 
     Args:
         model: radial, camera-triangles.
-        triangles: Random triangles per camera whose boxes are checked.
+        triangles: Random triangles per camera whose boxes are checked; for camera triangles, pairs per kind of rays.
         points: Points per camera and kind whose images are checked.
         json: Print the cases as JSON.
     """

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from mpcam.cli import main
-from mpcam.stress import radial
+from mpcam.stress import camera_triangles, radial
 from mpcam.stress.report import Case, as_dicts
 
 
@@ -45,6 +45,27 @@ def test_a_box_too_small_would_be_found(monkeypatch):
 
     monkeypatch.setattr(type(camera), "local_bound", half)
     assert radial.bound_cases("equidistant", camera, 500)[0].missed > 50
+
+
+def test_camera_triangles_pass():
+    from mpcam.stress import camera_triangle_bounds as bounds
+
+    for kind in bounds.KINDS:
+        for case in bounds.bound_cases(kind, 1):
+            assert case.good(camera_triangles.LIMIT) and case.count == bounds.FACES * bounds.TRIANGLES, case
+
+
+def test_a_lost_pixel_would_be_found(monkeypatch):
+    from mpcam.rendering import bundled
+    from mpcam.stress import camera_triangle_bounds as bounds
+    from mpcam_kernels import hierarchy
+
+    narrow = hierarchy.may_meet
+    bundled._pipeline.cache_clear()
+    monkeypatch.setattr(hierarchy, "may_meet", lambda cone, ball: narrow(cone, type(ball)(*ball.xyz, 0.5 * ball.w)))
+    found = {case.case: case.missed for case in bounds.bound_cases("positive", 1)}
+    bundled._pipeline.cache_clear()
+    assert found["tight, positive"] > 10
 
 
 def test_rows_are_json():

@@ -14,7 +14,6 @@ from mpcam_kernels.lanes import lanes
 from mpcam_kernels.rows import Rows, room
 
 LANES = 1 << 22  # at a time
-FLAT = 1 << 18  # pairs of a block and a triangle that are looked at without groups
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
 CULLING = ("objects", "triangles")
 
@@ -66,9 +65,6 @@ class Candidates:
         tell(stage, arrays) is told after each step.
         """
         bundle, top = task.bundle, len(levels) - 1
-        if split and top == 0 and bundle.cones.items * task.counts[0] <= FLAT:
-            cones, split = bundle.cones, False
-        bundles = cones.items
 
         def down(level: int, groups: bool, pairs: Pairs, number: int) -> Iterator[tuple[Pairs, int]]:
             if level == 0 and not groups:
@@ -84,9 +80,8 @@ class Candidates:
                 yield from down(below, groups, *after)
 
         step = ("all", task.counts[top])
-        for after in self._passed(
-            bundles * task.counts[top], 1, step, cones, levels[top], None, self._culls(top), tell
-        ):
+        pairs = cones.items * task.counts[top]
+        for after in self._passed(pairs, 1, step, cones, levels[top], None, self._culls(top), tell):
             yield from down(top, split, *after)
 
     def _passed(

@@ -10,6 +10,7 @@ import numpy as np
 from mpcam.cameras.three_rays import project
 from mpcam.errors import InputError
 from mpcam.math import polynomial
+from mpcam.stress import camera_triangle_bounds as bounds
 from mpcam.stress.report import Case
 
 LIMIT = 16.0
@@ -33,9 +34,17 @@ def run(triangles: int = 1_000_000, points: int = 200, progress: Progress | None
     """
     if triangles < 1 or points < 1:
         raise InputError(f"stress: triangles={triangles}, points={points}: at least 1 of each is needed")
-    cases = [*projection_cases(points, progress=progress), not_finite_case()]
-    if progress:
-        progress(2 * len(KINDS), 2 * len(KINDS), "done")
+    steps = 2 * len(KINDS) + len(bounds.KINDS)
+
+    def told(done: int, _: int, what: str) -> None:
+        if progress:
+            progress(done, steps, what)
+
+    cases = [*projection_cases(points, progress=told), not_finite_case()]
+    for number, kind in enumerate(bounds.KINDS):
+        told(2 * len(KINDS) + number, steps, f"bounds, {kind}")
+        cases += bounds.bound_cases(kind, triangles)
+    told(steps, steps, "done")
     return cases
 
 
