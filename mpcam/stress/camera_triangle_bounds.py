@@ -14,7 +14,7 @@ from mpcam.rendering.bundled import BOUNDS, Bundled
 from mpcam.rendering.device import types
 from mpcam.stress.report import Case
 
-SIDE, FACES, TRIANGLES = 20, 10, 1000
+SIDE, FACES, TRIANGLES = 20, 10, 2000
 """Pixels along the short sides of a camera triangle, camera triangles of a camera, and scene triangles before it."""
 KINDS = ("positive", "mixed signs", "grazing", "parallel", "concurrent", "mirror", "lens", "tiny triangles", "needles")
 
