@@ -90,14 +90,14 @@ class BundlePipeline:
 
         Small triangles go onto the canvas at once.
         """
-        types, bounds, walking = self.types, (task.bundle.cones, task.bundle.slopes), task.counts[0] > MANY
+        types, slopes, walking = self.types, task.bundle.slopes, task.counts[0] > MANY
         for found, number in self.candidates.met(task, task.bundle.groups, levels, True, tell):
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))
-                bits, small, listed = self._cover(lane, bounds, setups, found, walking)
+                bits, small, listed = self._cover(lane, slopes, setups, found, walking)
                 few = dr.compress(small) if walking else types.UInt()
                 if dr.width(few):
-                    canvas.state = self._walk(few, lane, task.bundle.pixels, bounds, setups, found, canvas.state)
+                    canvas.state = self._walk(few, lane, task.bundle.pixels, slopes, setups, found, canvas.state)
                     tell("small", canvas.state)
                 many = dr.compress(listed)
                 tell("blocks", many)
@@ -110,18 +110,16 @@ class BundlePipeline:
         dr.make_opaque(buffer)
         return buffer
 
-    def _cover_pass(self, lane: Any, bounds: Any, setups: Rows, pairs: Pairs, walking: bool) -> tuple[Any, Any, Any]:
-        cones, slopes = bounds
-        return cover.covered(self.types, skew, lane, cones, slopes, setups, pairs, walking)
+    def _cover_pass(self, lane: Any, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool) -> tuple[Any, Any, Any]:
+        return cover.covered(self.types, skew, lane, slopes, setups, pairs, walking)
 
     def _walk_pass(
-        self, chosen: Any, lane: Any, rays: Any, bounds: Any, setups: Rows, pairs: Pairs, state: State
+        self, chosen: Any, lane: Any, rays: Any, slopes: Rows, setups: Rows, pairs: Pairs, state: State
     ) -> State:
         buffer = self._blank() if state.buffer is None else state.buffer
         number = dr.gather(self.types.UInt, lane, chosen)
-        cones, slopes = bounds
         counted = cover.walk_small(
-            self.types, skew, self.output, number, rays, cones, slopes, setups, pairs, buffer, self.count
+            self.types, skew, self.output, number, rays, slopes, setups, pairs, buffer, self.count
         )
         return State(buffer, self._counted(state.counters, counted))
 

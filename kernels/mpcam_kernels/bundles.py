@@ -5,7 +5,7 @@ folds, mirrors, lenses.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 
@@ -38,8 +38,10 @@ class Bundle:
 
 @dataclass(frozen=True)
 class Cones:
-    """Bounds of bundles: origins no farther than `reach` from a centre, unit directions no farther than `spread` from
-    an axis. rows: (centre, reach), (axis, spread); reach is negative where there is no ray.
+    """Bounds of bundles: at distance t, rays are no farther than reach + |t - waist| spread from centre + (t - waist)
+    axis. Rays that converge are closest at their waist, others at their origins, where t is 0.
+
+    rows: (centre, reach), (axis, spread and waist in one number); reach is negative where there is no ray.
     """
 
     rows: Rows
@@ -49,42 +51,73 @@ class Cones:
         """How many there are."""
         return dr.width(self.rows.flat) // (4 * self.rows.count)
 
-    def __call__(self, types: Any, number: Any, active: Any = True) -> tuple[Any, Any]:
-        """The two rows of cones by number."""
+    def __call__(self, types: Any, number: Any, active: Any = True) -> "Cone":
+        """Cones by number."""
         first, second = self.rows.at(types, number, active)
-        return first, second
+        bits: Any = dr.reinterpret_array(types.UInt, second.w)
+        spread, waist = (dr.reinterpret_array(types.Float, half) for half in (bits & 0xFFFF0000, bits << 16))
+        return Cone(first.xyz, first.w, second.xyz, spread, waist)
 
 
-def may_meet(cone: tuple[Any, Any], ball: Any) -> Any:
+class Cone(NamedTuple):
+    """One of `Cones`."""
+
+    centre: Any
+    reach: Any
+    axis: Any
+    spread: Any
+    waist: Any
+
+    def rows(self, types: Any) -> list[Any]:
+        """The rows to be kept; the spread is rounded up. The waist must come from `waist`."""
+        bits: Any = dr.reinterpret_array(types.UInt, types.Float(dr.maximum(self.spread, 0.0)))
+        end: Any = dr.reinterpret_array(types.UInt, types.Float(self.waist))
+        both = ((bits + 0xFFFF) & 0xFFFF0000) | (end >> 16)
+        packed = dr.reinterpret_array(types.Float, types.UInt(both))
+        return [types.Array4f(*self.centre, self.reach), types.Array4f(*self.axis, packed)]
+
+
+def waist(types: Any, against: Any, square: Any) -> Any:
+    """Where rays are closest, from sums of (origin - mean) . (direction - mean) and of (direction - mean)^2.
+
+    Not before the origins; cut to the 16 bits that are kept of it.
+    """
+    where = dr.select(square > 1e-12, -against / dr.maximum(square, 1e-12), 0.0)
+    bits: Any = dr.reinterpret_array(types.UInt, types.Float(dr.clip(where, 0.0, 1e6)))
+    return dr.reinterpret_array(types.Float, types.UInt(bits & 0xFFFF0000))
+
+
+def may_meet(cone: Cone, ball: Any) -> Any:
     """False only where no ray of a cone meets a ball (centre and radius; a negative radius: nothing there).
 
-    A point q = o + t d of the ball has |q - centre - t axis| <= reach + t spread, so that some t >= 0 must have
-    |ball - centre - t axis| <= reach + radius + t spread: a quadratic inequality.
+    With t counted from the waist, a ball that is met has |ball - centre - t axis| <= reach + radius + |t| spread, for
+    some t from -waist on: a quadratic inequality to each side.
     """
-    first, second = cone
-    away, axis, spread = ball.xyz - first.xyz, second.xyz, second.w
-    total = first.w + ball.w
+    away, spread = ball.xyz - cone.centre, cone.spread
+    total = cone.reach + ball.w
     # What rounding can amount to.
     total = dr.fma(total + abs(away.x) + abs(away.y) + abs(away.z), 1e-5, total)
-    a = 1.0 - spread * spread
-    b = dr.dot(away, axis) + total * spread
-    c = dr.squared_norm(away) - total * total
-    possible = (c <= 0) | (a <= 1e-3) | ((b > 0) & (b * b >= a * c))
-    return possible & (first.w >= 0) & (ball.w >= 0)
+    along, more = dr.dot(away, cone.axis), total * spread
+    a, c = 1.0 - spread * spread, dr.squared_norm(away) - total * total
+    ahead, behind, end = along + more, more - along, cone.waist
+    forward = (ahead > 0) & (ahead * ahead >= a * c)
+    backward = (end > 0) & (behind > 0) & (behind * behind >= a * c)
+    backward &= (a * end >= behind) | (dr.fma(dr.fma(a, end, -2.0 * behind), end, c) <= 0)
+    return ((c <= 0) | (a <= 1e-3) | forward | backward) & (cone.reach >= 0) & (ball.w >= 0)
 
 
 def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
     """Two rows of the cones and six of the slopes of blocks by number.
 
     Slopes: direction and moment are centre + s right + t down, s and t from -1 to 1 over the places of the block, and
-    no more than a spread off. Rows: (d centre, d spread), (m centre, m spread), (d right, 0), (m right, 0), (d down,
-    0), (m down, 0).
+    no more than a spread off; origins lie within a ball. Rows: (d centre, d spread), (m centre, m spread), (d right,
+    ball x), (m right, ball y), (d down, ball z), (m down, ball radius).
     """
     zero, nothing = types.UInt(0), types.Float(0)
-    start = block * PIXELS
+    place = block * PIXELS
 
     def sample(k: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-        d, m, o = pixels.at(types, start + k)
+        d, m, o = pixels.at(types, place + k)
         s, t = position(types, k)
         return d, m, o, s, t, dr.squared_norm(d) > 0
 
@@ -101,14 +134,21 @@ def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
     inverse = 1.0 / dr.maximum(n, 1)
     d, m, o, s, t = d * inverse, m * inverse, o * inverse, s * inverse, t * inverse
 
-    def covariances(k: Any, ss: Any, st: Any, tt: Any, ds: Any, dt: Any, ms: Any, mt: Any) -> Any:
-        dk, mk, _, sk, tk, valid = sample(k)
+    def covariances(
+        k: Any, ss: Any, st: Any, tt: Any, ds: Any, dt: Any, ms: Any, mt: Any, against: Any, square: Any
+    ) -> Any:
+        dk, mk, ok, sk, tk, valid = sample(k)
         x, y = dr.select(valid, sk - s, 0), dr.select(valid, tk - t, 0)
         away, turn = dk - d, mk - m
-        return k + 1, ss + x * x, st + x * y, tt + y * y, ds + away * x, dt + away * y, ms + turn * x, mt + turn * y
+        # Not in place: the loop would take what is the same object for unchanged.
+        against = against + dr.select(valid, dr.dot(ok - o, away), 0)
+        square = square + dr.select(valid, dr.squared_norm(away), 0)
+        lines = ss + x * x, st + x * y, tt + y * y, ds + away * x, dt + away * y, ms + turn * x, mt + turn * y
+        return (k + 1, *lines, against, square)
 
-    state = (zero, nothing, nothing, nothing, empty, empty, empty, empty)
-    _, ss, st, tt, ds, dt, ms, mt = dr.while_loop(state, below, covariances)
+    state = (zero, nothing, nothing, nothing, empty, empty, empty, empty, nothing, nothing)
+    _, ss, st, tt, ds, dt, ms, mt, against, square = dr.while_loop(state, below, covariances)
+    closest = waist(types, against, square)
     # Least squares, held back where the places of the block lie on a line.
     ss, tt = ss + 1e-3, tt + 1e-3
     solve = 1.0 / (ss * tt - st * st)
@@ -117,23 +157,26 @@ def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
     d_middle, m_middle = d - d_right * s - d_down * t, m - m_right * s - m_down * t
     axis = d * dr.rsqrt(dr.maximum(dr.squared_norm(d), 1e-20))
 
-    def widest(k: Any, reach: Any, spread: Any, d_off: Any, m_off: Any) -> Any:
+    middle = o + closest * d
+
+    def widest(k: Any, start: Any, reach: Any, spread: Any, d_off: Any, m_off: Any) -> Any:
         dk, mk, ok, sk, tk, valid = sample(k)
         off = dk - d_middle - sk * d_right - tk * d_down
         turn = mk - m_middle - sk * m_right - tk * m_down
         return (
             k + 1,
-            dr.select(valid, dr.maximum(reach, dr.norm(ok - o)), reach),
+            dr.select(valid, dr.maximum(start, dr.norm(ok - o)), start),
+            dr.select(valid, dr.maximum(reach, dr.norm(ok + closest * dk - middle)), reach),
             dr.select(valid, dr.maximum(spread, dr.norm(dk - axis)), spread),
             dr.select(valid, dr.maximum(d_off, dr.norm(off)), d_off),
             dr.select(valid, dr.maximum(m_off, dr.norm(turn)), m_off),
         )
 
     none = types.Float(-1)
-    _, reach, spread, d_off, m_off = dr.while_loop((zero, none, none, none, none), below, widest)
-    cones = [types.Array4f(*o, reach), types.Array4f(*axis, spread)]
-    slopes = [(d_middle, d_off), (m_middle, m_off), (d_right, 0), (m_right, 0), (d_down, 0), (m_down, 0)]
-    return [*cones, *(types.Array4f(*row, last) for row, last in slopes)]
+    _, start, reach, spread, d_off, m_off = dr.while_loop((zero, none, none, none, none, none), below, widest)
+    cone = Cone(middle, reach, axis, spread, closest)
+    slopes = [(d_middle, d_off), (m_middle, m_off), (d_right, o.x), (m_right, o.y), (d_down, o.z), (m_down, start)]
+    return [*cone.rows(types), *(types.Array4f(*row, last) for row, last in slopes)]
 
 
 def position(types: Any, place: Any) -> tuple[Any, Any]:
@@ -147,25 +190,38 @@ def position(types: Any, place: Any) -> tuple[Any, Any]:
 
 def joined(types: Any, cones: Cones, first: Any, count: Any) -> list[Any]:
     """Rows of the cones around runs of cones."""
-    zero, nothing = types.UInt(0), types.Array3f(0)
+    zero, nothing, none = types.UInt(0), types.Array3f(0), types.Float(0)
 
     def more(k: Any, *_: Any) -> Any:
         return k < count
 
-    def add(k: Any, n: Any, centre: Any, axis: Any) -> Any:
-        a, b = cones(types, first + k)
-        one = dr.select(a.w >= 0, types.Float(1), 0)
-        return k + 1, n + one, centre + a.xyz * one, axis + b.xyz * one
+    def one(k: Any) -> tuple[Cone, Any, Any]:
+        """A cone, where its rays start on the whole, and 1 if there is any."""
+        cone = cones(types, first + k)
+        return cone, cone.centre - cone.waist * cone.axis, dr.select(cone.reach >= 0, types.Float(1), 0)
 
-    _, n, centre, axis = dr.while_loop((zero, types.Float(0), nothing, nothing), more, add)
-    centre = centre / dr.maximum(n, 1)
+    def add(k: Any, n: Any, start: Any, axis: Any) -> Any:
+        cone, origin, some = one(k)
+        return k + 1, n + some, start + origin * some, axis + cone.axis * some
+
+    _, n, start, axis = dr.while_loop((zero, none, nothing, nothing), more, add)
+    start, mean = start / dr.maximum(n, 1), axis / dr.maximum(n, 1)
     axis = axis * dr.rsqrt(dr.maximum(dr.squared_norm(axis), 1e-20))
 
+    def vary(k: Any, against: Any, square: Any) -> Any:
+        cone, origin, some = one(k)
+        away = cone.axis - mean
+        return k + 1, against + some * dr.dot(origin - start, away), square + some * dr.squared_norm(away)
+
+    closest = waist(types, *dr.while_loop((zero, none, none), more, vary)[1:])
+    centre = start + closest * mean
+
     def widen(k: Any, reach: Any, spread: Any) -> Any:
-        a, b = cones(types, first + k)
-        some = a.w >= 0
-        reach = dr.select(some, dr.maximum(reach, dr.norm(a.xyz - centre) + a.w), reach)
-        return k + 1, reach, dr.select(some, dr.maximum(spread, dr.norm(b.xyz - axis) + b.w), spread)
+        cone, _, some = one(k)
+        on = closest - cone.waist
+        far = dr.norm(cone.centre + on * cone.axis - centre) + cone.reach + abs(on) * cone.spread
+        reach = dr.select(some > 0, dr.maximum(reach, far), reach)
+        return k + 1, reach, dr.select(some > 0, dr.maximum(spread, dr.norm(cone.axis - axis) + cone.spread), spread)
 
     _, reach, spread = dr.while_loop((zero, types.Float(-1), types.Float(-1)), more, widen)
-    return [types.Array4f(*centre, reach), types.Array4f(*axis, spread)]
+    return Cone(centre, reach, axis, spread, closest).rows(types)

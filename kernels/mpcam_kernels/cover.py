@@ -9,7 +9,6 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import blocks, walk
-from mpcam_kernels.bundles import Cones
 from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
@@ -20,7 +19,7 @@ WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
 def covered(
-    types: Any, test: Any, lane: Any, cones: Cones, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool
+    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool
 ) -> tuple[Any, Any, Any]:
     """What of its block the triangle of each pair may cover.
 
@@ -29,7 +28,7 @@ def covered(
     """
     block, triangle = pairs.at(lane)
     shape = test.unpack(setups.at(types, triangle))
-    edges, front, back = _edges(types, shape, cones, slopes, block)
+    edges, front, back = _edges(types, shape, slopes, block)
     bits, small = _parts(types, edges, front, back), types.Bool(False)
     if walking:
         _, _, places = _box(types, _lines(types, edges, front))
@@ -52,7 +51,6 @@ def walk_small(
     output: Any,
     number: Any,
     rays: Any,
-    cones: Cones,
     slopes: Rows,
     setups: Rows,
     pairs: Pairs,
@@ -62,7 +60,7 @@ def walk_small(
     """Raise `buffer` to the keys of small pairs by number; returns tests and hits of each lane."""
     block, triangle = pairs.at(number)
     shape = test.unpack(setups.at(types, triangle))
-    edges, front, _ = _edges(types, shape, cones, slopes, block)
+    edges, front, _ = _edges(types, shape, slopes, block)
     lines = _lines(types, edges, front)
     columns, rows, _ = _box(types, lines)
     area = Region(columns[0], rows[0], columns[1], rows[1], lines)
@@ -73,7 +71,7 @@ def walk_small(
     return walk.walk(types, test, output, shape, shape.name, area, types.Bool(True), rays, place, buffer, count)
 
 
-def _edges(types: Any, shape: Any, cones: Cones, slopes: Rows, block: Any) -> tuple[list[Any], Any, Any]:
+def _edges(types: Any, shape: Any, slopes: Rows, block: Any) -> tuple[list[Any], Any, Any]:
     """Per edge its value in the middle of the block, its slopes to the right and down, and what it may be off.
 
     And whether rays may start in front of the triangle's plane, seen along the normal, and behind it: in front they hit
@@ -88,9 +86,8 @@ def _edges(types: Any, shape: Any, cones: Cones, slopes: Rows, block: Any) -> tu
             dr.dot(a.xyz, across) + dr.dot(b.xyz, along) for a, b in ((d, m), (d_right, m_right), (d_down, m_down))
         ]
         edges.append((*steps, slack))
-    start, _ = cones(types, block)
-    n = shape.normal
-    away, reach = shape.offset - dr.dot(n, start.xyz), dr.norm(n) * (start.w + 1e-6) + abs(shape.offset) * 1e-6
+    n, start = shape.normal, types.Array3f(d_right.w, m_right.w, d_down.w)
+    away, reach = shape.offset - dr.dot(n, start), dr.norm(n) * (m_down.w + 1e-6) + abs(shape.offset) * 1e-6
     return edges, away + reach >= 0, away - reach <= 0
 
 
