@@ -18,7 +18,6 @@ from mpcam_kernels.blocks import Pairs as Listed
 from mpcam_kernels.bundles import Cones, joined
 from mpcam_kernels.candidates import CULLING, LANES, Candidates, Task, Tell
 from mpcam_kernels.frozen import frozen
-from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.rows import Rows, room
@@ -102,7 +101,7 @@ class BundlePipeline:
                 many = dr.compress(listed)
                 tell("blocks", many)
                 if dr.width(many):
-                    yield self._listed(many, lane, found, bits, dr.zeros(types.UInt, self.blocks)), []
+                    yield self._listed(many, lane, found, bits), []
 
     def _blank(self) -> Any:
         """Keys of places where nothing is hit."""
@@ -110,11 +109,11 @@ class BundlePipeline:
         dr.make_opaque(buffer)
         return buffer
 
-    def _cover_pass(self, lane: Any, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool) -> tuple[Any, Any, Any]:
+    def _cover_pass(self, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool) -> tuple[Any, Any, Any]:
         return cover.covered(self.types, skew, lane, slopes, setups, pairs, walking)
 
     def _walk_pass(
-        self, chosen: Any, lane: Any, rays: Any, slopes: Rows, setups: Rows, pairs: Pairs, state: State
+        self, chosen: Any, lane: Any, rays: Any, slopes: Rows, setups: Rows, pairs: Any, state: State
     ) -> State:
         buffer = self._blank() if state.buffer is None else state.buffer
         number = dr.gather(self.types.UInt, lane, chosen)
@@ -123,7 +122,8 @@ class BundlePipeline:
         )
         return State(buffer, self._counted(state.counters, counted))
 
-    def _listed_pass(self, chosen: Any, lane: Any, pairs: Pairs, bits: Any, counts: Any) -> Listed:
+    def _listed_pass(self, chosen: Any, lane: Any, pairs: Any, bits: Any) -> Listed:
+        counts = dr.zeros(self.types.UInt, self.blocks)
         return cover.listed(self.types, chosen, dr.gather(self.types.UInt, lane, chosen), pairs, bits, counts)
 
     def _list_pass(self, lane: Any, pairs: Listed, lists: Lists) -> Lists:
@@ -193,17 +193,17 @@ class PlanePipeline(BundlePipeline):
                     item, block, bits = self._reached(lane, fan, found_planes, items, bundle.corners)
                     some = dr.compress(bits != 0)
                     if dr.width(some):
-                        yield self._joined(some, item, block, bits, dr.zeros(types.UInt, self.blocks)), items.rows
+                        yield self._joined(some, item, block, bits), items.rows
 
     def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, target: Rows) -> Rows:
         target.store(joined(self.types, cones, first, count), number)
         return target
 
-    def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, pairs: Pairs, cull: bool) -> Any:
+    def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, pairs: Any, cull: bool) -> Any:
         return planes.items(self.types, self.bound, lane, found, vertices, faces, pairs, cull)
 
     def _chosen_pass(
-        self, item: Any, chosen: Any, lane: Any, rows: list[Any], pairs: Pairs, targets: list[Any]
+        self, item: Any, chosen: Any, lane: Any, rows: list[Any], pairs: Any, targets: list[Any]
     ) -> planes.Items:
         face, _ = pairs.at(dr.gather(self.types.UInt, lane, chosen))
         for target, row in zip(targets, rows, strict=True):
@@ -213,7 +213,8 @@ class PlanePipeline(BundlePipeline):
     def _reached_pass(self, lane: Any, fan: int, found: Any, items: Any, corners: Any) -> tuple[Any, Any, Any]:
         return planes.reached(self.types, lane, fan, found, items, corners)
 
-    def _joined_pass(self, chosen: Any, item: Any, block: Any, bits: Any, counts: Any) -> Listed:
+    def _joined_pass(self, chosen: Any, item: Any, block: Any, bits: Any) -> Listed:
+        counts = dr.zeros(self.types.UInt, self.blocks)
         item, block, bits = (dr.gather(self.types.UInt, values, chosen) for values in (item, block, bits))
         dr.make_opaque(counts)
         return Listed(item, block, bits, dr.scatter_inc(counts, block), counts)

@@ -9,11 +9,12 @@ import drjit as dr
 from mpcam_kernels import hierarchy, skew
 from mpcam_kernels.bundles import Bundle, Cones
 from mpcam_kernels.frozen import frozen
-from mpcam_kernels.hierarchy import FAN, Pairs
+from mpcam_kernels.hierarchy import FAN, Chosen, Pairs
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.rows import Rows, room
 
 LANES = 1 << 22  # at a time
+FLEETING = 1 << 15  # pairs up to which they are worked out again rather than written down
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
 CULLING = ("objects", "triangles")
 
@@ -31,6 +32,9 @@ class Task:
     counts: tuple[int, ...]
     bundle: Bundle
     fan: int
+
+
+Known = Pairs | Chosen
 
 
 class Candidates:
@@ -58,7 +62,7 @@ class Candidates:
             levels.append(self._clusters(lanes(types, 0, count), levels[-1], counts[level], target))
         return setups, levels
 
-    def met(self, task: Task, cones: Cones, levels: list[Rows], split: bool, tell: Any) -> Iterator[tuple[Pairs, int]]:
+    def met(self, task: Task, cones: Cones, levels: list[Rows], split: bool, tell: Any) -> Iterator[tuple[Known, int]]:
         """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
 
         cones: of the bundles to begin with; split: they are groups, and blocks take their place on the way down.
@@ -66,7 +70,7 @@ class Candidates:
         """
         bundle, top = task.bundle, len(levels) - 1
 
-        def down(level: int, groups: bool, pairs: Pairs, number: int) -> Iterator[tuple[Pairs, int]]:
+        def down(level: int, groups: bool, pairs: Known, number: int) -> Iterator[tuple[Known, int]]:
             if level == 0 and not groups:
                 yield pairs, number
                 return
@@ -85,8 +89,16 @@ class Candidates:
             yield from down(top, split, *after)
 
     def _passed(
-        self, number: int, fan: int, step: Any, cones: Cones, balls: Rows, before: Pairs | None, cull: bool, tell: Any
-    ) -> Iterator[tuple[Pairs, int]]:
+        self,
+        number: int,
+        fan: int,
+        step: Any,
+        cones: Cones,
+        balls: Rows,
+        before: Known | None,
+        cull: bool,
+        tell: Any,
+    ) -> Iterator[tuple[Known, int]]:
         """A step over all pairs, a lane for each of their `fan` children, in chunks."""
         many = max(1, LANES // fan)
         for start in range(0, number, many):
@@ -94,28 +106,20 @@ class Candidates:
             chosen = dr.compress(self._mark(lane, step, cones, balls, before, cull))
             found = dr.width(chosen)
             tell("candidates", chosen)
-            if found:
+            if found and start == 0 and found <= FLEETING:
+                yield Chosen(chosen, step, before), found
+            elif found:
                 yield self._keep(chosen, lane, step, before), found
 
     def _culls(self, level: int) -> bool:
         return "triangles" in self.culling if level == 0 else True
 
-    def _children(self, lane: Any, step: Any, before: Any) -> tuple[Any, Any, Any]:
-        """Bundle and ball of each lane, and whether there are such."""
-        name, *rest = step
-        if name == "all":
-            return hierarchy.all_pairs(lane, rest[0])
-        if name == "groups":
-            fan, first, count = rest
-            return hierarchy.in_groups(self.types, lane, fan, first, count, before)
-        return hierarchy.in_clusters(lane, rest[0], before)
-
     def _mark_pass(self, lane: Any, step: Any, cones: Cones, balls: Rows, before: Any, cull: bool) -> Any:
-        bundle, ball, exists = self._children(lane, step, before)
+        bundle, ball, exists = hierarchy.children(lane, step, before)
         return hierarchy.meeting(self.types, cones, bundle, balls, ball, exists, cull)
 
     def _keep_pass(self, chosen: Any, lane: Any, step: Any, before: Any) -> Pairs:
-        bundle, ball, _ = self._children(dr.gather(self.types.UInt, lane, chosen), step, before)
+        bundle, ball, _ = hierarchy.children(dr.gather(self.types.UInt, lane, chosen), step, before)
         return Pairs(bundle, ball)
 
     def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, targets: Any) -> Any:

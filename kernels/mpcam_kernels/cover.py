@@ -9,7 +9,6 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import blocks, walk
-from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH
@@ -19,7 +18,7 @@ WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
 def covered(
-    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Pairs, walking: bool
+    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool
 ) -> tuple[Any, Any, Any]:
     """What of its block the triangle of each pair may cover.
 
@@ -37,7 +36,7 @@ def covered(
     return bits, small, bits != 0
 
 
-def listed(types: Any, chosen: Any, number: Any, pairs: Pairs, bits: Any, counts: Any) -> blocks.Pairs:
+def listed(types: Any, chosen: Any, number: Any, pairs: Any, bits: Any, counts: Any) -> blocks.Pairs:
     """Pairs by number, for the lists of their blocks. chosen: their places in `bits`. counts: zeros, one per block."""
     block, triangle = pairs.at(number)
     dr.make_opaque(counts)
@@ -53,7 +52,7 @@ def walk_small(
     rays: Any,
     slopes: Rows,
     setups: Rows,
-    pairs: Pairs,
+    pairs: Any,
     buffer: Any,
     count: bool,
 ) -> tuple[Any, Any]:

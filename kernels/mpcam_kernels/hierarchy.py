@@ -67,20 +67,34 @@ def meeting(types: Any, cones: Cones, bundle: Any, balls: Rows, ball: Any, exist
     return exists & (dr.gather(types.Float, balls.flat, ball * 4 + 3, exists) >= 0)
 
 
-def all_pairs(lane: Any, clusters: int) -> tuple[Any, Any, Any]:
-    """The pair of a lane, of all that there are, and that it exists."""
-    return lane // clusters, lane % clusters, True
+def children(lane: Any, step: tuple[Any, ...], before: Any) -> tuple[Any, Any, Any]:
+    """Bundle and ball of each lane of a step from pairs `before`, and whether there are such.
 
-
-def in_groups(types: Any, lane: Any, fan: int, first: Any, count: Any, before: Pairs) -> tuple[Any, Any, Any]:
-    """From pairs of a group and a ball to pairs of a block and the ball; fan: most blocks in a group."""
-    group, ball = before.at(lane // fan)
-    k = lane % fan
-    return dr.gather(types.UInt, first, group) + k, ball, k < dr.gather(types.UInt, count, group)
-
-
-def in_clusters(lane: Any, count: int, before: Pairs) -> tuple[Any, Any, Any]:
-    """From pairs of a bundle and a cluster to pairs of the bundle and the children, of which there are `count`."""
+    step: ("all", clusters): all pairs that there are; ("groups", fan, first, count): from a group to its blocks, which
+    begin at `first`, `fan` at most; ("clusters", count): from a cluster to its children, of which there are `count`.
+    """
+    name, *rest = step
+    if name == "all":
+        return lane // rest[0], lane % rest[0], True
+    if name == "groups":
+        fan, first, count = rest
+        group, ball = before.at(lane // fan)
+        k = lane % fan
+        return dr.gather(type(lane), first, group) + k, ball, k < dr.gather(type(lane), count, group)
     bundle, cluster = before.at(lane // FAN)
     child = cluster * FAN + lane % FAN
-    return bundle, child, child < count
+    return bundle, child, child < rest[0]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Pairs as the lanes of a step that found them: for few it is not worth writing them down."""
+
+    lanes: Any
+    step: tuple[Any, ...]
+    before: Any
+
+    def at(self, number: Any) -> tuple[Any, Any]:
+        """Pairs by number."""
+        bundle, ball, _ = children(dr.gather(type(number), self.lanes, number), self.step, self.before)
+        return bundle, ball

@@ -10,7 +10,6 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
-from mpcam_kernels.hierarchy import Pairs
 from mpcam_kernels.samples import PART, PARTS
 
 
@@ -79,7 +78,7 @@ def _all(types: Any) -> Any:
 
 
 def items(
-    types: Any, bound: str, lane: Any, planes: Planes, vertices: Any, faces: Any, pairs: Pairs, cull: bool
+    types: Any, bound: str, lane: Any, planes: Planes, vertices: Any, faces: Any, pairs: Any, cull: bool
 ) -> tuple[Any, Any]:
     """Regions of pairs of a camera triangle and a triangle, and whether there is any; with `cull`, any pixel in it."""
     face, triangle = pairs.at(lane)
