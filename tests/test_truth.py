@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import NAMES, cameras
+from triangle_cameras import CAMERAS, around
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_json
@@ -38,6 +39,20 @@ def test_sensor_traces_the_rays_of_the_camera(name):
     both = (image > 0) & hits.mask
     close = np.abs(image[both] - hits.depth[both]) <= 1e-4 * np.maximum(hits.depth[both], 1)
     assert close.mean() >= 0.999
+
+
+@pytest.mark.parametrize("name", ["direct", "mirror", "sizes", "lens", "mixed signs"])
+def test_sensor_traces_the_rays_of_camera_triangles(name):
+    camera = CAMERAS[name]()
+    mesh = around(camera, 150, 0.8)
+    hits = mp.rasterize(camera, mesh)
+    image = depth_image(mp.truth.sensor(camera, 1, centred=True), mesh)
+    # At the edges of triangles either answer is right in float32.
+    assert ((image > 0) != hits.mask).sum() <= 3
+    both = hits.mask & (image > 0)
+    assert both.sum() > 300
+    off = np.abs(image - np.where(both, hits.depth, 0))[both] / np.ptp(mesh.bounds)
+    assert (off > 1e-4).sum() <= 6 and np.median(off) < 1e-6
 
 
 def test_pinhole_sensor_is_mitsubas_own():
