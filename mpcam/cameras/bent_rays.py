@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras import three_rays
-from mpcam.math import Array, Vector, cross, detach, dot, epsilon, library, norm, normalize, vector, where
+from mpcam.math import Array, Vector, cross, detach, dot, epsilon, library, norm, normalize, plain, vector, where
 
 PARTS = 4  # along each side of a camera triangle
 IMAGES = 4
@@ -30,8 +30,11 @@ def project(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector)
     All components first, broadcast against each other. bend: origin and normal to direction and validity. At most
     IMAGES of them are found, in no order; two that nearly coincide (at a fold) may count as one.
     """
-    if library(*q, *v[0]) == "numpy":
+    kind = library(*q, *v[0])
+    if kind == "numpy":
         return _compressed(bend, v, n, q)
+    if kind == "jax":
+        return _stacked(bend, v, n, q)
     found = _nothing(0.0 * (q[0] + v[0][0]))
     for corners in _parts():
         found = _merged(found, _in_part(bend, corners, v, n, q))
@@ -58,6 +61,17 @@ def _compressed(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vec
             for part, value in zip(image, values, strict=True):
                 part[chosen] = value
     return [tuple(part.reshape(shape) for part in image) for image in found]  # pyright: ignore[reportReturnType]
+
+
+def _stacked(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector) -> list[Image]:
+    """The same for JAX, all parts along a leading axis: a sixteenth of the code to compile."""
+    found = _nothing(0.0 * (q[0] + v[0][0]))
+    wide = (-1, *(1,) * found[0][0].ndim)
+    corners = np.moveaxis(np.array(_parts()), 0, -1)  # corner, weight, part
+    images = _in_part(bend, [[weight.reshape(wide) for weight in corner] for corner in corners], v, n, q)
+    for part in range(len(_parts())):
+        found = _merged(found, [(a[part], b[part], c[part], d[part]) for a, b, c, d in images])
+    return found
 
 
 def _may_pass(rays: list[tuple[Vector, Vector, Array]], q: Vector) -> Array:
@@ -95,7 +109,7 @@ def _in_part(bend: Bend, corners: Any, v: Any, n: Any, q: Vector) -> list[Image]
     found = []
     for start in starts:
         weights = (start.w1, start.w2, 1.0 - start.w1 - start.w2)
-        second, third = (detach(sum(w * float(p[i]) for w, p in zip(weights, places, strict=True))) for i in range(2))
+        second, third = (detach(sum(w * plain(p[i]) for w, p in zip(weights, places, strict=True))) for i in range(2))
         *image, good = _refined(bend, v, n, q, second, third, detach(start.c))
         found.append((*image, good & start.valid))
     return found
