@@ -16,6 +16,7 @@ FORMAT = "png"
 def parts():
     """Outlines (F, 3, 2) of the camera triangles in the eye's picture, and the picture of the atlas."""
     scene = reflection_scene(width=400, height=300)
+    assert scene.mirror
     cams = mp.decompose(scene.mirror.surface, scene.camera, 26, resolution=96)
     seen = scene.camera.project(cams.vertices[cams.faces]).pixel[..., 0, :]
     picture = mp.render(scene.camera, scene, triangles=26, resolution=96)
