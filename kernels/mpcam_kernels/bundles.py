@@ -77,13 +77,14 @@ class Cone(NamedTuple):
         return [types.Array4f(*self.centre, self.reach), types.Array4f(*self.axis, packed)]
 
 
-def waist(types: Any, against: Any, square: Any) -> Any:
+def waist(types: Any, count: Any, against: Any, square: Any) -> Any:
     """Where rays are closest, from sums of (origin - mean) . (direction - mean) and of (direction - mean)^2.
 
-    Not before the origins; cut to the 16 bits that are kept of it.
+    Not before the origins, and there where rays are so nearly parallel that rounding would say where; cut to the 16
+    bits that are kept of it.
     """
-    where = dr.select(square > 1e-12, -against / dr.maximum(square, 1e-12), 0.0)
-    bits: Any = dr.reinterpret_array(types.UInt, types.Float(dr.clip(where, 0.0, 1e6)))
+    where = dr.select(square > 1e-5 * count, -against / dr.maximum(square, 1e-12), 0.0)
+    bits: Any = dr.reinterpret_array(types.UInt, types.Float(dr.clip(where, 0.0, 64.0)))
     return dr.reinterpret_array(types.Float, types.UInt(bits & 0xFFFF0000))
 
 
@@ -148,7 +149,7 @@ def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
 
     state = (zero, nothing, nothing, nothing, empty, empty, empty, empty, nothing, nothing)
     _, ss, st, tt, ds, dt, ms, mt, against, square = dr.while_loop(state, below, covariances)
-    closest = waist(types, against, square)
+    closest = waist(types, n, against, square)
     # Least squares, held back where the places of the block lie on a line.
     ss, tt = ss + 1e-3, tt + 1e-3
     solve = 1.0 / (ss * tt - st * st)
@@ -213,7 +214,7 @@ def joined(types: Any, cones: Cones, first: Any, count: Any) -> list[Any]:
         away = cone.axis - mean
         return k + 1, against + some * dr.dot(origin - start, away), square + some * dr.squared_norm(away)
 
-    closest = waist(types, *dr.while_loop((zero, none, none), more, vary)[1:])
+    closest = waist(types, n, *dr.while_loop((zero, none, none), more, vary)[1:])
     centre = start + closest * mean
 
     def widen(k: Any, reach: Any, spread: Any) -> Any:
