@@ -55,6 +55,13 @@ def test_camera_triangles_pass():
             assert case.good(camera_triangles.LIMIT) and case.count == bounds.FACES * bounds.TRIANGLES, case
 
 
+def test_parallel_rays_have_no_waist():
+    from mpcam.stress import camera_triangle_bounds as bounds
+
+    for case in bounds.bound_cases("parallel", 8 * bounds.FACES * bounds.TRIANGLES):
+        assert case.good(camera_triangles.LIMIT), case
+
+
 def test_a_lost_pixel_would_be_found(monkeypatch):
     from mpcam.rendering import bundled
     from mpcam.stress import camera_triangle_bounds as bounds
