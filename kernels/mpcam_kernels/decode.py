@@ -17,6 +17,14 @@ def depths(types: Any, output: Any, keys: Any, scale: Any) -> Any:
     return dr.select(keys == 0, dr.inf, scale / output.nearness(types, keys))
 
 
+def frame(types: Any, output: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
+    """What a frame of an output (see `outputs`) holds: triangle and depth, depth, or whether there is anything."""
+    if not output.depth:
+        return (keys != 0,)
+    depth = depths(types, output, keys, unit)
+    return (triangles(types, output, keys), depth) if hasattr(output, "triangle") else (depth,)
+
+
 def in_rows(kind: Any, values: Any, pixel: Any, width: int) -> Any:
     """Values kept in block order, for pixels that are numbered row by row."""
     return dr.gather(kind, values, places(pixel, width))

@@ -203,10 +203,7 @@ def _frozen_decode(output: str, width: int) -> Any:
     def decoded(pixel: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
         t = types()
         found = decode.in_rows(kind.kind(t), keys, pixel, width)
-        if output == "coverage":
-            return (found != 0,)
-        depth = decode.depths(t, kind, found, unit)
-        return (depth,) if output == "depth" else (decode.triangles(t, kind, found), depth)
+        return decode.frame(t, kind, found, unit)
 
     return decoded
 

@@ -341,10 +341,7 @@ def _frozen_decode(output: str) -> Any:
     def decoded(place: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
         t = types()
         found = dr.gather(kind.kind(t), keys, t.UInt(dr.maximum(place, 0)), place >= 0)
-        if output == "coverage":
-            return (found != 0,)
-        depth = decode.depths(t, kind, found, unit)
-        return (depth,) if output == "depth" else (decode.triangles(t, kind, found), depth)
+        return decode.frame(t, kind, found, unit)
 
     return decoded
 
