@@ -55,6 +55,17 @@ class Theme:
             "savefig.dpi": 200,
         }
 
+    def pictures(self, pictures: dict[str, Any], height: float, rows: int = 1) -> Any:
+        """A figure of pictures (H, W, 3) by title, next to each other; height in inches."""
+        from matplotlib import pyplot
+
+        figure, axes = pyplot.subplots(rows, -(-len(pictures) // rows), figsize=(self.width, height))
+        for place, (title, picture) in zip(axes.flat, pictures.items(), strict=True):
+            place.imshow(picture, interpolation="antialiased")
+            place.set_title(title)
+            place.set_axis_off()
+        return figure
+
 
 def _cycle(palette: tuple[str, ...]) -> Any:
     from cycler import cycler

@@ -3,7 +3,6 @@
 import functools
 
 import numpy as np
-from matplotlib import pyplot
 
 from mpcam.effects.reflection import Reflection
 from mpcam.experiments.hou2006_scenes import reflection_scene
@@ -25,9 +24,4 @@ def pictures():
 
 
 def draw(theme):
-    figure, axes = pyplot.subplots(2, 2, figsize=(theme.width, 5.0))
-    for place, (title, picture) in zip(axes.flat, pictures().items(), strict=True):
-        place.imshow(picture, interpolation="antialiased")
-        place.set_title(title)
-        place.set_axis_off()
-    return figure
+    return theme.pictures(pictures(), 5.0, rows=2)

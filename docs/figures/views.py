@@ -4,7 +4,6 @@ import functools
 import math
 
 import numpy as np
-from matplotlib import pyplot
 
 import mpcam as mp
 
@@ -32,9 +31,4 @@ def views():
 
 
 def draw(theme):
-    figure, axes = pyplot.subplots(1, 4, figsize=(theme.width, 2.05))
-    for place, (title, picture) in zip(axes, views().items(), strict=True):
-        place.imshow(picture, interpolation="antialiased")
-        place.set_title(title)
-        place.set_axis_off()
-    return figure
+    return theme.pictures(views(), 2.05)

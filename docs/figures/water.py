@@ -4,7 +4,6 @@ import dataclasses
 import functools
 
 import numpy as np
-from matplotlib import pyplot
 
 import mpcam as mp
 from mpcam.effects.reflection import Reflection
@@ -26,9 +25,4 @@ def pictures():
 
 
 def draw(theme):
-    figure, axes = pyplot.subplots(1, 3, figsize=(theme.width, 2.2))
-    for place, (title, picture) in zip(axes, pictures().items(), strict=True):
-        place.imshow(picture, interpolation="antialiased")
-        place.set_title(title)
-        place.set_axis_off()
-    return figure
+    return theme.pictures(pictures(), 2.2)
