@@ -21,7 +21,7 @@ from mpcam_kernels.frozen import frozen
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.rows import Rows, room
-from mpcam_kernels.samples import PIXELS
+from mpcam_kernels.samples import PIXELS, of_block
 
 ROOM = 1 << 20  # pairs of a block and a triangle at a time
 MANY = 1024  # triangles, from which on some may be small
@@ -134,9 +134,9 @@ class BundlePipeline:
 
         def corner(place: Any) -> tuple[Any, Any]:
             """Column and row of places within their camera triangle."""
-            block = place // PIXELS
-            x, y = (dr.gather(self.types.UInt, values, block) for values in corners)
-            return x + ((place >> 4) & 3) * 4 + (place & 3), y + ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+            x, y = (dr.gather(self.types.UInt, values, place // PIXELS) for values in corners)
+            column, row = of_block(place)
+            return x + column, y + row
 
         keys, *counted = pixels.through_lists(
             self.types, skew, self.output, lane, rays, large, lists, buffer, corner, bool(large.regions), self.count

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from mpcam_kernels.rows import Rows
-from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH
+from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH, of_block
 from mpcam_kernels.skew import Rays
 
 GROUP = 32  # most blocks in a group
@@ -182,8 +182,7 @@ def bounds(types: Any, pixels: Rays, block: Any) -> list[Any]:
 
 def position(types: Any, place: Any) -> tuple[Any, Any]:
     """Where a place lies in its block, from -1 to 1 along both sides."""
-    x = ((place >> 4) & 3) * 4 + (place & 3)
-    y = ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+    x, y = of_block(place)
     return (types.Float(x) - 0.5 * (WIDTH - 1)) * (2.0 / (WIDTH - 1)), (types.Float(y) - 0.5 * (HEIGHT - 1)) * (
         2.0 / (HEIGHT - 1)
     )

@@ -19,7 +19,7 @@ class CentralTriangle(NamedTuple):
     usable: Any
 
 
-def _follows(p: Vector, q: Vector) -> Any:
+def follows(p: Vector, q: Vector) -> Any:
     """Lexicographic order of positions."""
     return (p.x > q.x) | ((p.x == q.x) & ((p.y > q.y) | ((p.y == q.y) & (p.z > q.z))))
 
@@ -30,7 +30,7 @@ def _edge_normal(p: Vector, q: Vector) -> Vector:
     Written with q - p, which is exact for short edges: the edge is then off by an angle of a few units in the last
     place, however small the triangle is.
     """
-    swap = _follows(p, q)
+    swap = follows(p, q)
     low, high = dr.select(swap, q, p), dr.select(swap, p, q)
     normal = dr.cross(low, high - low)
     return dr.select(swap, -normal, normal)

@@ -11,7 +11,7 @@ import drjit as dr
 from mpcam_kernels import blocks, walk
 from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
-from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH
+from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
 SMALL = 48  # places between the lines that one lane walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
@@ -65,7 +65,7 @@ def walk_small(
     area = Region(columns[0], rows[0], columns[1], rows[1], lines)
 
     def place(x: Any, y: Any) -> Any:
-        return block * PIXELS + ((y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3))
+        return block * PIXELS + in_block(x, y)
 
     return walk.walk(types, test, output, shape, shape.name, area, types.Bool(True), rays, place, buffer, count)
 

@@ -62,6 +62,16 @@ def blocks(width: int, height: int) -> tuple[int, int]:
     return -(-width // WIDTH), -(-height // HEIGHT)
 
 
+def in_block(x: Any, y: Any) -> Any:
+    """Place within its block of a column and a row of it."""
+    return (y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3)
+
+
+def of_block(place: Any) -> tuple[Any, Any]:
+    """Column and row, within its block, of a place."""
+    return ((place >> 4) & 3) * 4 + (place & 3), ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+
+
 def place(x: Any, y: Any, width: int) -> Any:
     """Place of a pixel in block order."""
     block = (y // HEIGHT) * (-(-width // WIDTH)) + x // WIDTH

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from mpcam_kernels.central import follows
 from mpcam_kernels.rows import Rows
 
 Float = Any
@@ -58,7 +59,7 @@ class SkewTriangle(NamedTuple):
 
 def _edge(p: Vector, q: Vector) -> tuple[Vector, Vector]:
     """p x q and q - p, to the bit the negatives of those of the edge from q to p, so that neighbours leave no gap."""
-    swap = (p.x > q.x) | ((p.x == q.x) & ((p.y > q.y) | ((p.y == q.y) & (p.z > q.z))))
+    swap = follows(p, q)
     low, high = dr.select(swap, q, p), dr.select(swap, p, q)
     along = high - low
     across = dr.cross(low, along)

@@ -243,7 +243,7 @@ def _frozen_rays(kind: str) -> Any:
     from mpcam_kernels.bundles import Bundle, Cones, bounds, joined
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.rows import Rows, room
-    from mpcam_kernels.samples import PIXELS
+    from mpcam_kernels.samples import PIXELS, of_block
     from mpcam_kernels.skew import Rays, packed
 
     @frozen
@@ -251,8 +251,8 @@ def _frozen_rays(kind: str) -> Any:
         t = types()
         block = place // PIXELS
         face, side = dr.gather(t.UInt, fixed["face"], block), dr.gather(t.UInt, fixed["side"], block)
-        x = dr.gather(t.UInt, fixed["x"], block) + ((place >> 4) & 3) * 4 + (place & 3)
-        y = dr.gather(t.UInt, fixed["y"], block) + ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+        column, row = of_block(place)
+        x, y = dr.gather(t.UInt, fixed["x"], block) + column, dr.gather(t.UInt, fixed["y"], block) + row
         last = t.Float(side) - 1
         second, third = t.Float(x) / last, t.Float(y) / last
         table = [dr.gather(t.Array3f, rows, face * 6 + k) for k in range(6)]

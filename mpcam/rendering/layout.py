@@ -8,7 +8,7 @@ import numpy as np
 from mpcam.cameras.atlas import Atlas
 from mpcam.geometry.order import interleaved
 from mpcam_kernels.bundles import GROUP
-from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH
+from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH, in_block
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +54,7 @@ def layout(atlas: Atlas) -> Layout:
         grid[top // HEIGHT, left // WIDTH] = np.arange(len(left))
         mine = sides[owner] == side
         numbers[mine] = grid[row[mine] // HEIGHT, column[mine] // WIDTH]
-    within = ((row >> 2 & 1) << 6) | ((column >> 2 & 3) << 4) | ((row & 3) << 2) | (column & 3)
-    places[exists] = (starts[owner] + numbers) * PIXELS + within
+    places[exists] = (starts[owner] + numbers) * PIXELS + in_block(column % WIDTH, row % HEIGHT)
     return Layout(
         np.repeat(np.arange(len(sides), dtype=np.int32), counts),
         x,
