@@ -141,13 +141,13 @@ def render(
 ) -> None:
     """Render a scene or mesh to an image file; an EXR also keeps the depth and the camera.
 
-    Where the scene has a mirror, the rest is seen in it: by camera triangles (--method invert), by an environment map
-    (environment) or by rays of the true surface (raytrace).
+    Where the scene has a mirror, the rest is seen in it: by camera triangles (--method invert), by its vertices with
+    straight edges between (vertex), by an environment map (environment) or by rays of the true surface (raytrace).
 
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
-        method: invert, vertex, cubemap, hemicube or raytrace; with a mirror also environment.
+        method: invert, vertex, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment or raytrace.
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.

@@ -138,6 +138,8 @@ def test_fig6(tmp_path):
         edges, errors = ([row[name] for row in cams] for name in ("edge", "ray_rms"))
         assert edges == sorted(edges, reverse=True) and errors[-1] < errors[0]
         assert any(row["moving_front"] for row in mine)
+        straight, halved = (row["flip"] for row in mine if row["method"] == "vertices")
+        assert cams[-1]["flip"] < halved < straight
 
 
 def test_ray_errors_fall_with_the_square_of_the_edge():

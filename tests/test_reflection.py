@@ -7,7 +7,7 @@ import pytest
 
 import mpcam as mp
 from mpcam.comparison import metrics
-from mpcam.effects.reflection import Reflection
+from mpcam.effects.reflection import METHODS, Reflection
 
 SIZE = (96, 72)
 
@@ -132,7 +132,7 @@ def test_panoramas_are_looked_up_where_they_lie():
         mp.EnvironmentMap.from_panorama(np.zeros((4, 4)))
 
 
-@pytest.mark.parametrize("method", ["camera_triangles", "environment", "raytrace"])
+@pytest.mark.parametrize("method", METHODS)
 def test_moved_vertices_give_the_moved_picture(method):
     shown = scene(WAVE)
     picture = Reflection(shown, method=method)
@@ -159,19 +159,26 @@ def test_render_explains_and_compare_measures(tmp_path):
     found = Reflection(shown).explanation
     assert "camera triangles" in found.ran and "environment map" in found.left_out
     table = mp.compare(
-        shown, settings={"camera_triangles": [26, 104], "environment": [64]}, repeats=1, output=tmp_path / "out"
+        shown,
+        settings={"camera_triangles": [26, 104], "vertex": [2], "environment": [64]},
+        repeats=1,
+        output=tmp_path / "out",
     )
-    assert [row.label for row in table] == ["camera_triangles 26", "camera_triangles 104", "environment 64", "raytrace"]
+    labels = ["camera_triangles 26", "camera_triangles 104", "vertex level 2", "environment 64", "raytrace"]
+    assert [row.label for row in table] == labels
     flip, ray = table.column("flip"), table.column("ray_angle")
-    assert flip[1] < flip[0] < flip[2] and flip[3] == 0 and ray[1] < ray[0]
+    assert flip[1] < flip[0] < flip[3] and flip[4] == 0 < flip[2] and ray[1] < ray[0]
     assert (tmp_path / "out" / "report.html").exists() and "mrad" in str(table)
 
 
 def test_mistakes_are_told():
     shown = scene(WAVE)
     for arguments, words in (
-        ({"method": "magic"}, "camera_triangles, environment, raytrace"),
-        ({"method": "raytrace", "triangles": 10}, "goes with method='camera_triangles'"),
+        ({"method": "magic"}, "camera_triangles, vertex, environment, raytrace"),
+        ({"method": "raytrace", "triangles": 10}, "goes with method='camera_triangles' or 'vertex', not with 'raytr"),
+        ({"level": 1}, "level= goes with method='vertex'"),
+        ({"method": "vertex", "level": 9}, "from 0 to 7"),
+        ({"triangles": 0}, "from 1 to"),
         ({"camera": mp.Orthographic(8, 8)}, "common centre"),
         ({"mirror": WAVE}, "give mpcam.Mirror"),
         ({"shading": "shiny"}, "allowed are"),
@@ -181,7 +188,7 @@ def test_mistakes_are_told():
     with pytest.raises(mp.InputError, match="no mirror"):
         Reflection(mp.Scene(things(), camera=shown.camera))
     with pytest.raises(mp.InputError, match="shows no mirror"):
-        mp.render(shown.camera, shown, method="vertex")
+        mp.render(shown.camera, shown, method="cubemap")
     for arguments in ({"surface": 3}, {"surface": WAVE, "index": 0}, {"surface": WAVE, "color": (1, 2)}):
         with pytest.raises(mp.InputError, match="mirror"):
             mp.Mirror(**arguments)

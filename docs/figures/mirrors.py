@@ -1,4 +1,4 @@
-"""Near things in a wavy mirror by an environment map, by camera triangles and by rays of the true surface."""
+"""Near things in a wavy mirror by environment map, projected vertices, camera triangles and rays of the surface."""
 
 import functools
 
@@ -16,6 +16,8 @@ def pictures():
     scene = reflection_scene(width=400, height=300)
     found = {
         "Environment map": Reflection(scene, method="environment"),
+        "Vertices, edges straight": Reflection(scene, method="vertex", triangles=416),
+        "Vertices, edges halved twice": Reflection(scene, method="vertex", triangles=416, level=2),
         "26 camera triangles": Reflection(scene, triangles=26, resolution=96),
         "416 camera triangles": Reflection(scene, triangles=416, resolution=32),
         "Rays of the true surface": Reflection(scene, method="raytrace"),

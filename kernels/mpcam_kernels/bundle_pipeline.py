@@ -90,7 +90,8 @@ class BundlePipeline:
         Small triangles go onto the canvas at once.
         """
         types, slopes, walking = self.types, task.bundle.slopes, task.counts[0] > MANY
-        for found, number in self.candidates.met(task, task.bundle.groups, levels, True, tell):
+        bundle = task.bundle
+        for found, number in self.candidates.met(task.counts, bundle.groups, levels, tell, (bundle, task.fan)):
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))
                 bits, small, listed = self._cover(lane, slopes, setups, found, walking)
@@ -176,7 +177,7 @@ class PlanePipeline(BundlePipeline):
         target = room(types, 2, dr.width(faces))
         cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, target))
         fan, cull = int(dr.max(found_planes.count)[0]), "triangles" in self.candidates.culling
-        for found, number in self.candidates.met(task, cones, levels, False, tell):
+        for found, number in self.candidates.met(task.counts, cones, levels, tell):
             # Regions are large, so few at a time.
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))

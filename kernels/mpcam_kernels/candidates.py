@@ -56,37 +56,46 @@ class Candidates:
         types, counts = self.types, task.counts
         targets = room(types, skew.ROWS, counts[0]), room(types, 1, counts[0])
         setups, balls = self._set_up(lanes(types, 0, counts[0]), task.vertices, task.faces, task.names, targets)
+        return setups, self.levels(balls, counts)
+
+    def levels(self, balls: Rows, counts: tuple[int, ...]) -> list[Rows]:
+        """Balls and, level by level, those around clusters of them; counts: how many there are of each."""
         levels = [balls]
         for level, count in enumerate(counts[1:] if "objects" in self.culling else ()):
-            target = room(types, 1, count)
-            levels.append(self._clusters(lanes(types, 0, count), levels[-1], counts[level], target))
-        return setups, levels
+            target = room(self.types, 1, count)
+            levels.append(self._clusters(lanes(self.types, 0, count), levels[-1], counts[level], target))
+        return levels
 
-    def met(self, task: Task, cones: Cones, levels: list[Rows], split: bool, tell: Any) -> Iterator[tuple[Known, int]]:
-        """Pairs of a bundle and a triangle that may meet, in chunks, and how many there are.
+    def met(
+        self,
+        counts: tuple[int, ...],
+        cones: Cones,
+        levels: list[Rows],
+        tell: Any,
+        split: tuple[Bundle, int] | None = None,
+    ) -> Iterator[tuple[Known, int]]:
+        """Pairs of a bundle and a ball that may meet, in chunks, and how many there are.
 
-        cones: of the bundles to begin with; split: they are groups, and blocks take their place on the way down.
-        tell(stage, arrays) is told after each step.
+        cones: of the bundles to begin with. split: they are the groups of these rays, with so many blocks at most, and
+        blocks take their place on the way down. tell(stage, arrays) is told after each step.
         """
-        bundle, top = task.bundle, len(levels) - 1
+        top = len(levels) - 1
 
-        def down(level: int, groups: bool, pairs: Known, number: int) -> Iterator[tuple[Known, int]]:
-            if level == 0 and not groups:
+        def down(level: int, groups: Any, around: Cones, pairs: Known, number: int) -> Iterator[tuple[Known, int]]:
+            if level == 0 and groups is None:
                 yield pairs, number
                 return
-            around = bundle.groups if groups else bundle.cones if split else cones
             if groups and (level == 0 or FAN**level <= GROUPED):
-                step, fan, below, groups = ("groups", task.fan, bundle.first, bundle.count), task.fan, level, False
-                around = bundle.cones
+                (bundle, fan), below = groups, level
+                step, around, groups = ("groups", fan, bundle.first, bundle.count), bundle.cones, None
             else:
-                step, fan, below = ("clusters", task.counts[level - 1]), FAN, level - 1
+                step, fan, below = ("clusters", counts[level - 1]), FAN, level - 1
             for after in self._passed(number, fan, step, around, levels[below], pairs, self._culls(below), tell):
-                yield from down(below, groups, *after)
+                yield from down(below, groups, around, *after)
 
-        step = ("all", task.counts[top])
-        pairs = cones.items * task.counts[top]
+        step, pairs = ("all", counts[top]), cones.items * counts[top]
         for after in self._passed(pairs, 1, step, cones, levels[top], None, self._culls(top), tell):
-            yield from down(top, split, *after)
+            yield from down(top, split, cones, *after)
 
     def _passed(
         self,

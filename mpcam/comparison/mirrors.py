@@ -1,4 +1,4 @@
-"""`mpcam.compare` for scenes with a mirror: camera triangles at several numbers, environment maps, and traced rays."""
+"""`mpcam.compare` for scenes with a mirror: camera triangles, vertices, environment maps, traced rays."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 
 from mpcam.comparison import metrics, timing
-from mpcam.comparison.plan import PARAMETER, Choice
+from mpcam.comparison.plan import LEVELS, PARAMETER, Choice
 from mpcam.comparison.progress import Steps
 from mpcam.comparison.table import Row
 from mpcam.decomposition.ray_error import ray_error
-from mpcam.effects.reflection import Reflection
+from mpcam.effects.reflection import METHODS, Reflection
 from mpcam.errors import InputError
 from mpcam.geometry.scene import Scene
 
 TRIANGLES = (26, 52, 104, 208, 416, 1664)
 SIZES = (64, 256, 1024)
-METHODS = ("camera_triangles", "environment", "raytrace")
+FINE = 416
+"""Camera triangles in which the vertices of method "vertex" are looked for."""
 
 
 def mirror_plan(
@@ -31,7 +32,12 @@ def mirror_plan(
     for name in (*names, *settings):
         if name not in METHODS:
             raise InputError(f"Method {name!r} shows no mirror; the methods: {', '.join(METHODS)}.")
-    defaults: dict[str, Sequence[Any]] = {"camera_triangles": TRIANGLES, "environment": SIZES, "raytrace": ({},)}
+    defaults: dict[str, Sequence[Any]] = {
+        "camera_triangles": TRIANGLES,
+        "vertex": LEVELS,
+        "environment": SIZES,
+        "raytrace": ({},),
+    }
     choices = []
     for name in names:
         for entry in settings.get(name, defaults[name]):
@@ -57,7 +63,8 @@ def mirror_rows(
     """Rows, their images, and the true image: rays of the true surface, traced by Mitsuba.
 
     A frame is the whole picture here: what is beside the mirror, what is in it, both shaded. Unless the settings say
-    otherwise, the atlas has as many pixels as the camera has on the mirror.
+    otherwise, the atlas has as many pixels as the camera has on the mirror, and vertices are projected by FINE camera
+    triangles.
     """
     true = Reflection(scene, camera, method="raytrace", shading=shading)
     truth, pixels = true.image(), int(true.mask.sum())
@@ -68,6 +75,8 @@ def mirror_rows(
     for choice in plan:
         started = timing.now()
         settings = dict(choice.settings)
+        if choice.method == "vertex":
+            settings.setdefault("triangles", FINE)
         if choice.method == "camera_triangles" and "triangles" in settings and "resolution" not in settings:
             settings["resolution"] = max(4, round(np.sqrt(2 * pixels / settings["triangles"])))
         picture = Reflection(scene, camera, method=choice.method, shading=shading, **settings)
@@ -82,7 +91,7 @@ def mirror_rows(
             psnr=metrics.psnr(rmse),
             flip=float(metrics.flip_map(image, truth).mean()),
             compile_ms=first,
-            note="the truth, so its errors against it are 0 by definition" if choice.method == "raytrace" else "",
+            note=_note(choice.method),
         )
         if choice.method == "camera_triangles":
             row = _counted(row, picture, camera)
@@ -98,6 +107,12 @@ def mirror_rows(
         for label, found in timing.measure(calls, repeats, warmup, on_call=steps.done).items():
             rows[label] = replace(rows[label], moving_ms=1e3 * found.median, moving_spread=1e3 * found.spread)
     return list(rows.values()), images, truth
+
+
+def _note(method: str) -> str:
+    if method == "vertex":
+        return f"straight edges between vertices; {FINE} camera triangles unless the setting names others"
+    return "the truth, so its errors against it are 0 by definition" if method == "raytrace" else ""
 
 
 def _counted(row: Row, picture: Reflection, camera: Any) -> Row:

@@ -6,7 +6,7 @@ Positions are in the frame of the receivers' device mesh (`DeviceMesh`), or turn
 import functools
 from typing import Any
 
-from mpcam.rendering.device import types
+from mpcam.rendering.device import placed, types
 
 DENSITY = 2.0
 """Points that a landed triangle is dropped at, for each pixel that it covers."""
@@ -149,7 +149,7 @@ def plan(size: int, width: int, height: int, model: Any) -> Any:
             smooth &= (off <= _BEND * dr.norm(edge) + 1e-6) & (abs(dr.dot(normals[i], normals[j])) > 0.7)
         pixels = []
         for where in places:
-            image = camera.local_project(_to_eye(t, pose, where))[0]
+            image = camera.local_project(placed(pose, where))[0]
             smooth &= image.valid
             pixels.append(image.pixel)
         (ax, ay), (bx, by), (cx, cy) = pixels
@@ -217,7 +217,7 @@ def drop(size: int, width: int, height: int, model: Any) -> Any:
         owner = dr.select(whole | chosen[0], ids[0], dr.select(chosen[1], ids[1], ids[2]))
         longest = dr.maximum(dr.norm(places[1] - places[0]), dr.norm(places[2] - places[0]))
         slack = dr.select(whole, 0.05 * longest, 0.0)
-        point = _to_eye(t, pose, where)
+        point = placed(pose, where)
         image = camera.local_project(point)[0]
         u, v = image.pixel
         inside = image.valid & (u >= 0) & (v >= 0) & (u < width) & (v < height) & (power > 0)
@@ -300,9 +300,3 @@ def spread(width: int, height: int, radius: float) -> Any:
         return gathered(pixel, used | {"area": seen["area"]}, shares(pixel, used, dropped))
 
     return run
-
-
-def _to_eye(t: Any, pose: list[Any], point: Any) -> Any:
-    """Points of the receivers' frame in the eye's."""
-    x, y, z = point
-    return t.Array3f(*(pose[3 * i] * x + pose[3 * i + 1] * y + pose[3 * i + 2] * z + pose[9 + i] for i in range(3)))

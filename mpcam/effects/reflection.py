@@ -1,21 +1,19 @@
 """Pictures of scenes with a curved mirror or lens face, near objects in it, by camera triangles (Hou et al. 2006).
 
-The same picture by other means, to compare with: an environment map, and rays traced from the true surface.
+The same picture by other means, to compare with: vertices with straight edges between them, an environment map, and
+rays traced from the true surface.
 """
 
 import functools
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.decomposition.decompose import decompose
-from mpcam.decomposition.reflector import reflector_of
-from mpcam.decomposition.resolve import Resolver
-from mpcam.effects.environment import DeviceEnvironment
-from mpcam.effects.lookup import back_to_back, check_size
+from mpcam.effects.lookup import check_size
+from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, Part
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
@@ -28,31 +26,27 @@ from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import check_shading, check_shadows, shade_device
 
-METHODS = ("camera_triangles", "environment", "raytrace")
-
-
-class Part(Protocol):
-    """What is seen in the mirror, by one method."""
-
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the scene's vertices."""
-        ...
-
-    def colours(self) -> list[Any]:
-        """Three Floats, one number for each pixel of the eye's camera, evaluated; anything beside the mirror."""
-        ...
+SETTINGS: dict[str, tuple[str, ...]] = {
+    "camera_triangles": ("triangles", "resolution", "cams"),
+    "vertex": ("triangles", "level", "cams"),
+    "environment": ("size",),
+    "raytrace": (),
+}
+"""The methods, and what may be set of each."""
+METHODS = tuple(SETTINGS)
 
 
 class Reflection:
     """Frames of a scene with a mirror; everything that does not change with the scene's vertices is made here.
 
     scene: its meshes are seen in the mirror and beside it. mirror: default the scene's. camera: with a common centre;
-    default the scene's. method: "camera_triangles"; "environment", an environment map from the mirror's middle, two
-    views of `size` pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as for `render`; rays
-    that miss the scene see its environment, or its background. triangles, resolution: in place of the mirror's. cams:
-    camera triangles to take instead of decomposing the mirror. shadows: shadow maps of the scene's lights (see
-    `shadow_map`), in which the mirror itself throws none. Raises InputError for a scene without mirror or camera,
-    an eye that does not see it, and other values.
+    default the scene's. method: "camera_triangles"; "vertex", the images of the scene's vertices in camera triangles,
+    joined by straight edges, each split 2**level times first; "environment", an environment map from the mirror's
+    middle, two views of `size` (512) pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as
+    for `render`; rays that miss the scene see its environment, or its background. triangles, resolution: in place of
+    the mirror's. cams: camera triangles to take instead of decomposing the mirror. shadows: shadow maps of the scene's
+    lights (see `shadow_map`), in which the mirror itself throws none. Raises InputError for a scene without mirror or
+    camera, an eye that does not see it, and other values.
     """
 
     @exclusive
@@ -66,7 +60,8 @@ class Reflection:
         shading: str = "light",
         triangles: int | None = None,
         resolution: int | None = None,
-        size: int = 512,
+        size: int | None = None,
+        level: int | None = None,
         cams: CameraTriangles | None = None,
         shadows: Sequence[Any] = (),
     ):
@@ -82,20 +77,24 @@ class Reflection:
         check_shading(shading)
         check_shadows(shadows, scene, shading)
         self.camera, self.mirror = given, found
-        settings = {"triangles": triangles, "resolution": resolution, "cams": cams}
-        idle = [name for name, value in settings.items() if value is not None]
         if method not in METHODS:
             raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
-        if method != "camera_triangles" and idle:
-            raise InputError(f"{idle[0]}= goes with method='camera_triangles', not with {method!r}")
+        given_settings = {"triangles": triangles, "resolution": resolution, "cams": cams, "size": size, "level": level}
+        for name, value in given_settings.items():
+            if value is not None and name not in SETTINGS[method]:
+                fitting = " or ".join(repr(one) for one in METHODS if name in SETTINGS[one])
+                raise InputError(f"{name}= goes with method={fitting}, not with {method!r}")
         self.direct = prepare(given, scene.mesh)
         self.part: Part
+        many = found.triangles if triangles is None else triangles
         if method == "camera_triangles":
-            self.part = _ByTriangles(self, triangles or found.triangles, resolution or found.resolution, cams)
+            self.part = ByTriangles(self, many, found.resolution if resolution is None else resolution, cams)
+        elif method == "vertex":
+            self.part = ByVertices(self, many, 0 if level is None else level, cams)
         elif method == "environment":
-            self.part = _ByEnvironment(self, check_size(size))
+            self.part = ByEnvironment(self, check_size(512 if size is None else size))
         else:
-            self.part = _ByTracing(self)
+            self.part = ByTracing(self)
         self._color = opaque_numbers(list(found.color))
 
     @exclusive
@@ -124,33 +123,47 @@ class Reflection:
     @property
     def cams(self) -> CameraTriangles | None:
         """The camera triangles that stand for the mirror; None for other methods."""
-        return self.part.cams if isinstance(self.part, _ByTriangles) else None
+        return self.part.cams if isinstance(self.part, (ByTriangles, ByVertices)) else None
 
     @property
     def hits(self) -> Hits:
         """First hits of the camera triangles' rays. Raises InputError for other methods."""
-        if not isinstance(self.part, _ByTriangles):
+        if not isinstance(self.part, ByTriangles):
             raise InputError(f"method={self.method!r} has no camera triangles that hit anything")
         return self.part.prepared.frame()
 
     @property
     def explanation(self) -> Explanation:
         """Which stages a frame takes, which are left out, and why."""
-        triangles, tracing = isinstance(self.part, _ByTriangles), self.method == "raytrace"
-        many = f"{self.cams.count} that the camera sees" if self.cams else ""
-        bent = "its pixels bend the camera's rays by interpolated normals" if triangles else ""
+        triangles, tracing = isinstance(self.part, ByTriangles), self.method == "raytrace"
+        vertices = isinstance(self.part, ByVertices)
+        many = f"{self.cams.count} that the camera sees; " if self.cams else ""
+        bent = (
+            "their pixels bend the camera's rays by interpolated normals" if triangles else "with rays at the corners"
+        )
         other = f"method {self.method!r}"
         lost = self.scene.environment is not None
         return Explanation(
             (
                 Step("direct view", True, f"{self.scene.mesh.triangle_count:,} scene triangles beside the mirror"),
-                Step("camera triangles", triangles, f"{many}; {bent}" if triangles else other),
+                Step("camera triangles", triangles or vertices, f"{many}{bent}" if self.cams else other),
                 Step(
                     "candidates",
-                    triangles,
-                    "groups and blocks of rays against clusters of triangles" if triangles else other,
+                    triangles or vertices,
+                    "groups and blocks of rays against clusters of triangles"
+                    if triangles
+                    else "camera triangles against clusters of vertices"
+                    if vertices
+                    else other,
                 ),
-                Step("root finding", False, "rays of pixels are known; only project() needs the cubic"),
+                Step(
+                    "root finding",
+                    vertices,
+                    "the image of each vertex, by the cubic"
+                    if vertices
+                    else "rays of pixels are known; only project() needs the cubic",
+                ),
+                Step("straight edges", vertices, "between the images of vertices" if vertices else other),
                 Step(
                     "atlas to picture",
                     triangles,
@@ -181,77 +194,6 @@ class Reflection:
     def mask(self) -> np.ndarray:
         """(H, W) bool: pixels that see the mirror, unless something stands before it."""
         return np.isfinite(self.rays.distance).reshape(self.camera.height, self.camera.width)
-
-
-class _ByTriangles:
-    """The scene through camera triangles, brought to the eye's pixels."""
-
-    def __init__(self, whole: Reflection, triangles: int, resolution: int, cams: CameraTriangles | None):
-        mirror = whole.mirror
-        if cams is None:
-            cams = decompose(mirror.surface, whole.camera, triangles, resolution=resolution, index=mirror.index)
-        self.cams, self.whole = cams, whole
-        self.resolver = Resolver(cams, mirror.surface, whole.camera)
-        self.prepared = prepare(cams, whole.scene.mesh)
-        self._nothing = opaque_numbers([0.0, 0.0, 0.0])
-
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
-
-    def colours(self) -> list[Any]:
-        import drjit as dr
-
-        atlas = self.whole.shaded(self.prepared.frame())
-        return self.resolver.on_device(dr.ravel(atlas), self._nothing)
-
-
-class _ByEnvironment:
-    """Two views of the surroundings from the mirror's middle, looked up along the true rays."""
-
-    def __init__(self, whole: Reflection, size: int):
-        self.whole, self.size = whole, size
-        middle = reflector_of(whole.mirror.surface).center
-        self.views = [prepare(camera, whole.scene.mesh) for camera in back_to_back(middle, size)]
-        directions = np.ascontiguousarray(np.asarray(whole.rays.ray.direction).T, np.float32)
-        self.directions = types().Array3f(directions) + opaque_zero()
-
-    def update(self, vertices: np.ndarray) -> None:
-        for view in self.views:
-            view.update(vertices)
-
-    def colours(self) -> list[Any]:
-        import drjit as dr
-
-        parts: list[Any] = [dr.ravel(self.whole.shaded(view.frame())) for view in self.views]
-        texels = dr.concat(parts)
-        return list(_look_up()(DeviceEnvironment(texels, self.size), self.directions))
-
-
-@functools.cache
-def _look_up() -> Any:
-    from mpcam_kernels.frozen import frozen
-
-    @frozen
-    def looked_up(environment: DeviceEnvironment, directions: Any) -> Any:
-        return environment.lookup(directions)
-
-    return looked_up
-
-
-class _ByTracing:
-    """The scene along the rays of the true surface."""
-
-    def __init__(self, whole: Reflection):
-        from mpcam.truth.raytrace import RayTraced
-
-        self.whole = whole
-        self.prepared = RayTraced(whole.camera, whole.scene.mesh, whole.rays.ray)
-
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
-
-    def colours(self) -> list[Any]:
-        return list(self.whole.shaded(self.prepared.frame()))
 
 
 def _over(depth: Any, beside: Any, distance: Any, colours: list[Any], color: list[Any]) -> Any:

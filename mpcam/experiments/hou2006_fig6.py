@@ -1,4 +1,4 @@
-"""Hou et al. 2006, Figs. 1 and 6: quality of a mirror against tessellation, beside environment maps and ray tracing."""
+"""Hou et al. 2006, Figs. 1 and 6: quality of a mirror against tessellation, beside other methods and ray tracing."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +26,10 @@ from mpcam.geometry.scene import Scene
 ROUNDS = 7
 SIZES = (64, 128, 256, 512, 1024)
 """Pixels along a side of each of the two views of an environment map."""
+HALVINGS = (0, 1, 2, 3, 4)
+"""Times that the edges are halved before vertices are projected."""
+FINE = 416
+"""Camera triangles that project them."""
 LEVELS = ((26, 128), (52, 90), (104, 64), (208, 45), (416, 32), (1664, 16))
 """Camera triangles and their resolution: about as many pixels in all."""
 
@@ -50,11 +54,15 @@ def _levels(quick: bool) -> tuple[tuple[int, int], ...]:
     return LEVELS[:5:2] if quick else LEVELS
 
 
+def _halvings(quick: bool) -> tuple[int, ...]:
+    return HALVINGS[:3:2] if quick else HALVINGS
+
+
 def run(repeats: int | None = None, quick: bool = False, progress: Progress | None = None) -> Report:
     """Run the experiment; see `mpcam.experiments.run`."""
     count = rounds(repeats, quick, ROUNDS)
     sizes = SIZES[:3:2] if quick else SIZES
-    number = 1 + len(sizes) + len(_levels(quick))
+    number = 1 + len(sizes) + len(_halvings(quick)) + len(_levels(quick))
     steps = Steps(progress, len(SHAPES) * (1 + number * (1 + 2 * (1 + WARMUP + count))) + 1)
     rows: list[dict[str, Any]] = []
     shown: dict[str, list[Shown]] = {}
@@ -94,6 +102,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
             slope="of ray error against the length of edges, both logarithmic: 2 is what linear interpolation gives",
             still="a whole shaded picture, scene beside the mirror included, when all building is done",
             moving="the same from new vertices on; the shadow map stays",
+            vertices=f"their images by {FINE} camera triangles with rays at the corners, edges halved `level` times",
             environment="two views of so many pixels from the middle of the mirror, drawn anew in every frame",
         ),
         quick=quick,
@@ -124,6 +133,9 @@ def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps:
     for size in sizes:
         picture = Reflection(scene, method="environment", size=size, shadows=maps)
         add(picture, method="environment map", setting=f"2 × {size}²", pixels_k=2e-3 * size * size)
+    for level in _halvings(quick):
+        picture = Reflection(scene, method="vertex", level=level, triangles=FINE, shadows=maps)
+        add(picture, method="vertices", setting=f"level {level}")
     all_cams = tessellations(scene, quick)
     steps.done(f"{shape}, camera triangles")
     for cams in all_cams:
@@ -199,11 +211,14 @@ def _reading(rows: list[dict[str, Any]], slopes: list[dict[str, Any]]) -> str:
     for slope in slopes:
         mine = [row for row in rows if row["mirror"] == slope["mirror"]]
         cams = [row for row in mine if "edge" in row]
-        best = min((row for row in mine if row["method"] == "environment map"), key=lambda row: row["flip"])
+        around, vertices = (
+            min(row["flip"] for row in mine if row["method"] == method) for method in ("environment map", "vertices")
+        )
         parts.append(
             f"{slope['mirror']}: FLIP {cams[0]['flip']:.3f} with {cams[0]['camera_triangles']} and "
-            f"{cams[-1]['flip']:.3f} with {cams[-1]['camera_triangles']} camera triangles, {best['flip']:.3f} with the "
-            f"best environment map; ray error falls with the edge's power of {slope['slope']:.2f}"
+            f"{cams[-1]['flip']:.3f} with {cams[-1]['camera_triangles']} camera triangles, {around:.3f} with the "
+            f"best environment map, {vertices:.3f} with vertices and straight edges at best; ray error falls with the "
+            f"edge's power of {slope['slope']:.2f}"
         )
     wins = sum(row["moving_front"] == "yes" for row in rows if row["method"] == "camera triangles")
     tried = sum(row["method"] == "camera triangles" for row in rows)

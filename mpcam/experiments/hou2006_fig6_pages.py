@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from mpcam.experiments.hou2006_fig6 import Shown
 
 Rows = list[dict[str, Any]]
-METHODS = ("camera triangles", "environment map", "ray tracing")
-MARKS = ("o", "s", "D")
+METHODS = ("camera triangles", "environment map", "ray tracing", "vertices")
+MARKS = ("o", "s", "D", "^")
 
 
 def quality_table(rows: Rows) -> Table:
@@ -76,7 +76,7 @@ def time_plot(rows: Rows) -> Plot:
             axes.grid()
         panels[0].set_ylabel("FLIP over the mirror")
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        figure.legend(handles, labels, loc="outside lower center", ncols=5)
 
     caption = (
         "Error against time of a moving picture, whole and shaded, by mirror. Numbers are camera triangles; the line "
@@ -118,17 +118,18 @@ def error_plot(rows: Rows) -> Plot:
 
 
 def gallery(shown: "list[Shown]", name: str, title: str) -> Gallery:
-    """The truth, an environment map and tessellations, each above its difference from the truth."""
+    """The truth, an environment map, vertices and tessellations, each above its difference from the truth."""
     truth = shown[0]
     environment = [one for one in shown if one.row["method"] == "environment map"][-2:-1]
+    vertices = [one for one in shown if one.row["method"] == "vertices"][1:2]
     cams = [one for one in shown if "camera_triangles" in one.row]
     chosen = [one for one in cams if one.row["camera_triangles"] in _wanted(cams, 4)]
     cut = _around(truth.picture.mask)
     pictures = []
-    for one in (truth, *environment, *chosen):
+    for one in (truth, *environment, *vertices, *chosen):
         row = one.row
         label = f"{row['method'].capitalize()} {row['setting']}".strip()
-        key = {"ray tracing": "truth", "environment map": "environment"}.get(row["method"])
+        key = {"ray tracing": "truth", "environment map": "environment", "vertices": "vertices"}.get(row["method"])
         difference = heat(flip_map(one.image, truth.image))
         both = np.concatenate([one.image[cut], difference[cut]])
         caption = f"{label}, FLIP {row['flip']:.3f}" if one is not truth else label

@@ -13,7 +13,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.hits import Hits, Stats, View
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
 
@@ -67,6 +67,7 @@ class Buffered:
     bound: str = "tight"
     output: str = "hits"
     cull: str = "none"
+    view: Callable[[], View] | None = None
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
@@ -181,7 +182,7 @@ class Buffered:
             tests, rendered = self.count(positions)
             return Stats(int(tests), int(rendered))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.view)
 
 
 @functools.cache

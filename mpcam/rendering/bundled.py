@@ -10,7 +10,6 @@ import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.pose import frame_origin
-from mpcam.cameras.types import Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
@@ -138,17 +137,14 @@ class DeviceRays:
         import drjit as dr
 
         t = types()
-        self.anchor, self.unit = device.anchor, opaque_numbers([device.scale])[0]
+        self.device = device
         self.layout: Layout = layout(camera.atlas)
         self.fan = int(self.layout.count.max())
         fixed = _on_device(self.layout, camera.atlas)
         self.place = fixed["place"]
         pose = np.asarray(camera.camera_from_world, np.float64)
         centre = frame_origin(pose) - device.anchor
-        corners = [camera.corners(i) for i in range(3)]
-        places = [(pose[:3, :3].T @ np.asarray(place) + centre[:, None]) / device.scale for place, _ in corners]
-        turned = [pose[:3, :3].T @ np.asarray(along) for _, along in corners]
-        table = np.stack([values for pair in zip(places, turned, strict=True) for values in pair])  # (6, 3, F)
+        table = corner_rays(camera, device)
         rows = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel())
         bent: dict[str, Any] = {}
         if camera.directions is None:
@@ -166,14 +162,7 @@ class DeviceRays:
     @exclusive
     def view(self) -> View:
         """The rays in scene units, in world axes from the mesh's anchor."""
-        import drjit as dr
-
-        pose = np.eye(4)
-        pose[:3, 3] = -self.anchor
-        origin, direction, valid = self.in_rows()
-        ray = Ray(origin * self.unit, direction, valid)
-        dr.eval(ray)
-        return View(pose, ray)
+        return self.device.view(*self.in_rows())
 
     def in_rows(self) -> tuple[Any, Any, Any]:
         """Origin, direction and validity of every pixel's ray, row by row, in the mesh's frame."""
@@ -185,6 +174,17 @@ class DeviceRays:
         direction, _, origin = pixels.at(t, number)
         valid = valid & (dr.squared_norm(direction) > 0)
         return origin, dr.select(valid, direction, t.Array3f(0, 0, 1)), valid
+
+
+def corner_rays(camera: CameraTriangles, device: DeviceMesh) -> np.ndarray:
+    """Positions and rays (or normals) of corner 1, then 2, then 3 of all camera triangles, (6, 3, F), in the mesh's
+    frame.
+    """
+    pose = np.asarray(camera.camera_from_world, np.float64)
+    centre, rows = frame_origin(pose) - device.anchor, []
+    for place, along in (camera.corners(i) for i in range(3)):
+        rows += [(pose[:3, :3].T @ np.asarray(place) + centre[:, None]) / device.scale, pose[:3, :3].T @ along]
+    return np.stack(rows)
 
 
 @functools.lru_cache(maxsize=8)
@@ -304,15 +304,20 @@ def _bender(kind: str, bent: dict[str, Any]) -> CameraTriangles:
 
 def _tree(mesh: Mesh) -> tuple[Any, Any, tuple[int, ...]]:
     """Numbers and corners of the triangles, neighbours together, and the sizes of the levels of clusters above."""
-    from mpcam_kernels.hierarchy import FAN
-
     with np.errstate(invalid="ignore", over="ignore"):
         order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
-    counts = [mesh.triangle_count]
+    faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
+    return types().UInt(order.astype(np.uint32)), types().UInt(faces), levels(mesh.triangle_count)
+
+
+def levels(count: int) -> tuple[int, ...]:
+    """How many balls there are, and how many clusters of them level by level."""
+    from mpcam_kernels.hierarchy import FAN
+
+    counts = [count]
     while counts[-1] > FEW and len(counts) < 5:
         counts.append(-(-counts[-1] // FAN))
-    faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
-    return types().UInt(order.astype(np.uint32)), types().UInt(faces), tuple(counts)
+    return tuple(counts)
 
 
 @functools.lru_cache(maxsize=32)

@@ -10,9 +10,11 @@ import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.profiles import Profile
+from mpcam.cameras.types import Ray
 from mpcam.errors import InputError, SetupError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math import library
+from mpcam.rendering.hits import View
 
 
 def types() -> Any:
@@ -59,6 +61,23 @@ class DeviceMesh:
         return (
             types().Float(flat) + opaque_zero()
         )  # in Dr.Jit's own memory: frozen kernels are particular about alignment
+
+    def rays(self, rays: Ray) -> tuple[Any, Any, Any]:
+        """World rays (N, 3) in the mesh's frame: world axes, from the anchor, in units of the scale."""
+        t = types()
+        origin = (np.asarray(rays.origin, np.float64) - self.anchor) / self.scale
+        origin, along = (np.ascontiguousarray(x.T, np.float32) for x in (origin, np.asarray(rays.direction)))
+        return t.Array3f(origin), t.Array3f(along), t.Bool(np.ascontiguousarray(rays.valid))
+
+    def view(self, origin: Any, direction: Any, valid: Any) -> View:
+        """Rays of the mesh's frame, one per pixel, as what hits were found with: in scene units, from the anchor."""
+        import drjit as dr
+
+        pose = np.eye(4)
+        pose[:3, 3] = -self.anchor
+        ray = Ray(origin * opaque_numbers([self.scale])[0], direction, valid)
+        dr.eval(ray)
+        return View(pose, ray)
 
     def pose(self, camera: Camera) -> list[Any]:
         """Rotation (9) and shift (3) from device vertices to the camera frame in units of `scale`, opaque."""
@@ -211,7 +230,11 @@ def to_camera(pose: list[Any], vertices: Any, count: Any) -> Any:
     """Device vertices numbered by `count` in the camera frame, in units of the mesh's scale."""
     import drjit as dr
 
-    t = types()
-    x, y, z = dr.gather(t.Array3f, vertices, count)
+    return placed(pose, dr.gather(types().Array3f, vertices, count))
+
+
+def placed(pose: list[Any], point: Any) -> Any:
+    """Points in another frame; pose: nine numbers of a rotation, three of a shift."""
+    x, y, z = point
     rows = [pose[3 * i] * x + pose[3 * i + 1] * y + pose[3 * i + 2] * z + pose[9 + i] for i in range(3)]
-    return t.Array3f(*rows)
+    return types().Array3f(*rows)

@@ -120,9 +120,10 @@ def render(
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
     shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
     frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
-    seen in it: by camera triangles with method "invert", by rays of the true surface with "raytrace", or by an
-    "environment" map; for the settings, and for many frames, see `Reflection`. explain: print to standard error which
-    stages run, which are left out and why (see `mpcam.explain`). Raises InputError.
+    seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of the true
+    surface with "raytrace", or by an "environment" map; for the settings, and for many frames, see `Reflection`.
+    explain: print to standard error which stages run, which are left out and why (see `mpcam.explain`). Raises
+    InputError.
     """
     whole = Scene.of(scene)
     if whole.mirror is not None:
@@ -144,12 +145,12 @@ def _mirrored(
     camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
 ) -> np.ndarray:
     """`render` of a scene with a mirror."""
-    from mpcam.effects.reflection import Reflection
+    from mpcam.effects.reflection import SETTINGS, Reflection
 
-    names = {"invert": "camera_triangles", "raytrace": "raytrace", "environment": "environment"}
+    names = {"invert": "camera_triangles"} | {name: name for name in ("vertex", "environment", "raytrace")}
     if method not in names:
         raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
-    allowed = {"invert": ("triangles", "resolution"), "environment": ("size",)}.get(method, ())
+    allowed = [name for name in SETTINGS[names[method]] if name != "cams"]
     for name in settings:
         if name not in allowed:
             raise InputError(

@@ -83,19 +83,38 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
             point = to_camera(pose, vertices, number)
         else:
             points = (2**level + 1) * (2**level + 2) // 2
-            corners = dr.gather(types().Array3u, faces, number // points)
-            second, third = dr.gather(types().Array2f, grid, number % points)
-            a, b, c = (to_camera(pose, vertices, corner) for corner in corners)
-            point = a + (b - a) * second + (c - a) * third
-        point = point * unit if not central else point
-        pixel, inside = camera.local_image(point)
-        depth = dr.norm(point) * unit if central else point.z
-        # Behind a pinhole there is no image; beyond the rim of a disc there is one, marked by a negative depth.
-        depth = dr.select(inside, depth, dr.nan if unbounded else -depth) if central else depth
-        dr.scatter(target, types().Array4f(pixel.x, pixel.y, depth, 0), number)
+            point = tessellated(grid, lambda number: to_camera(pose, vertices, number), faces, number, points)
+        if not central:
+            point = point * unit
+            pixel, _ = camera.local_image(point)
+            row = types().Array4f(pixel.x, pixel.y, point.z, 0)
+        else:
+            row = corner(camera, point, dr.norm(point) * unit, unbounded)
+        dr.scatter(target, row, number)
         return target
 
     return place
+
+
+def corner(camera: Any, point: Any, depth: Any, unbounded: bool) -> Any:
+    """Pixel and depth of points in the frame of a camera with a centre, as corners of straight-edged triangles.
+
+    Behind a pinhole there is no image; beyond the rim of a disc there is one, marked by a negative depth.
+    """
+    import drjit as dr
+
+    pixel, inside = camera.local_image(point)
+    return types().Array4f(pixel.x, pixel.y, dr.select(inside, depth, dr.nan if unbounded else -depth), 0)
+
+
+def tessellated(grid: Any, at: Any, faces: Any, point: Any, points: int) -> Any:
+    """Place of grid point number `point` of a triangle cut into parts, of which there are `points`; at(corner)."""
+    import drjit as dr
+
+    t = types()
+    a, b, c = (at(number) for number in dr.gather(t.Array3u, faces, point // points))
+    second, third = dr.gather(t.Array2f, grid, point % points)
+    return a + (b - a) * second + (c - a) * third
 
 
 class Parts:

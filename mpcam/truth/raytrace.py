@@ -9,7 +9,7 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_numbers, opaque_zero, types
+from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats, View
 from mpcam.truth.meshes import mitsuba_mesh, move, position_key
@@ -30,14 +30,6 @@ def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
     return world, [sum(columns[i][j] * direction[j] for j in range(3)) for i in range(3)], valid
 
 
-def uploaded(rays: Ray, device: DeviceMesh) -> tuple[Any, Any, Any]:
-    """World rays in the frame of a device mesh."""
-    t = types()
-    origin = (np.asarray(rays.origin, np.float64) - device.anchor) / device.scale
-    origin, along = (np.ascontiguousarray(x.T, np.float32) for x in (origin, np.asarray(rays.direction)))
-    return t.Array3f(origin), t.Array3f(along), t.Bool(np.ascontiguousarray(rays.valid))
-
-
 class RayTraced:
     """Frames by tracing each pixel's ray through a tree over the triangles.
 
@@ -55,7 +47,7 @@ class RayTraced:
         self.camera, self.mesh, self.own_rays = camera, mesh, rays is None
         self.device: DeviceMesh = device_mesh(mesh)
         with mitsuba() as mi:
-            world, along, valid = rays_in_rows(camera, self.device) if rays is None else uploaded(rays, self.device)
+            world, along, valid = rays_in_rows(camera, self.device) if rays is None else self.device.rays(rays)
             self._ray = mi.Ray3f(mi.Point3f(*map(mi.Float, world)), mi.Vector3f(*map(mi.Float, along)))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
@@ -124,12 +116,9 @@ class RayTraced:
         )
 
     def _view(self) -> View:
-        """The rays in scene units, in world axes from the mesh's anchor."""
-        t, pose = types(), np.eye(4)
-        pose[:3, 3] = -self.device.anchor
-        scale = opaque_numbers([self.device.scale])[0]
-        origin = t.Array3f(*(t.Float(x) * scale for x in self._ray.o))
-        return View(pose, Ray(origin, t.Array3f(*(t.Float(x) for x in self._ray.d)), t.Bool(self._valid)))
+        t = types()
+        origin, direction = (t.Array3f(*(t.Float(x) for x in part)) for part in (self._ray.o, self._ray.d))
+        return self.device.view(origin, direction, t.Bool(self._valid))
 
     @exclusive
     def stages(self) -> dict[str, float]:
