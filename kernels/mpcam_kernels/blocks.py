@@ -1,7 +1,8 @@
 """Large triangles and blocks of pixels: which blocks each one may cover, and block by block which triangles.
 
 Coarse squares are looked at first, then the blocks in those that a triangle may cover. A block's list says of each of
-its triangles also which parts of the block it may cover.
+its triangles also which parts of the block it may cover. Lists are chains, so that the pass that finds their entries
+can link them too: nothing is counted, sorted or moved.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from mpcam_kernels.samples import COARSE, HEIGHT, PART, PARTS, WIDTH, Samples
 
 LANES_WANTED = 1 << 14  # the rows of a triangle's squares are shared among lanes until there are about so many
 LEAST_SHARE = 4
+LINK = 1 << PARTS
+MOST = (1 << 32) // LINK - 1  # entries that can be numbered
 BLOCKS = COARSE // HEIGHT  # in a coarse square, above each other
 
 
@@ -40,27 +43,39 @@ class Squares:
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """Names of triangles, blocks that they may cover, which parts of these, and the rank in the block's list.
+class Lists:
+    """Which triangles each block may hold, as chains of entries: one pass builds them, in any order.
 
-    counts: pairs of each block. found: how many pairs there are, if the arrays have more room.
+    entries: two numbers each: the name of a triangle, and LINK * the number of the block's next entry + the parts of
+    the block, as bits. heads: the number of each block's first entry. Numbers count from 1; 0 ends a chain.
     """
 
-    names: Any
-    blocks: Any
-    parts: Any
-    ranks: Any
-    counts: Any
-    found: Any = None
-
-
-@dataclass(frozen=True)
-class Lists:
-    """Block by block the names of triangles and the parts of the block, in pairs; where lists start, their lengths."""
-
     entries: Any
-    starts: Any
-    counts: Any
+    heads: Any
+
+    def add(self, types: Any, number: Any, block: Any, name: Any, parts: Any, active: Any) -> None:
+        """Make the entries of these numbers, from 0 to MOST - 1, the first of their blocks."""
+        following: Any = dr.scatter_exch(self.heads, number + 1, block, active)
+        dr.scatter(self.entries, types.Array2u(name, following * LINK + parts), number, active)
+
+    def first(self, types: Any, block: Any) -> Any:
+        """Number of the first entry of blocks; 0: none."""
+        return dr.gather(types.UInt, self.heads, block)
+
+    def name(self, types: Any, number: Any) -> Any:
+        """Name of the triangle of an entry."""
+        return dr.gather(types.UInt, self.entries, 2 * number - 2)
+
+    def link(self, types: Any, number: Any) -> Any:
+        """The entry's second number; 0 beyond the end."""
+        return dr.gather(types.UInt, self.entries, 2 * number - 1, number > 0)
+
+
+def room(types: Any, entries: int, blocks: int) -> Lists:
+    """Empty lists of so many blocks."""
+    heads = dr.zeros(types.UInt, blocks)
+    dr.make_opaque(heads)
+    return Lists(dr.empty(types.UInt, 2 * entries), heads)
 
 
 def append(types: Any, test: Any, area: regions.Region, shape: Any, triangle: Any, active: Any, large: Large) -> None:
@@ -127,7 +142,7 @@ def find_squares(
     return result
 
 
-def find_pairs(
+def list_blocks(
     types: Any,
     test: Any,
     lanes: Any,
@@ -135,10 +150,10 @@ def find_pairs(
     large: Large,
     grid: tuple[int, int],
     squares: Squares,
-    most: int,
+    lists: Lists,
     by_item: bool,
-) -> Pairs:
-    """Blocks that may have a hit: a lane for each square and block in it. `most`: room for one of every lane.
+) -> Lists:
+    """Lists of the blocks that may have a hit: a lane for each square and block in it.
 
     by_item: name triangles by their item, else by their own number.
     """
@@ -157,22 +172,5 @@ def find_pairs(
         reached = exists & (first <= last) & (start < left + PART) & (stop > left) & (start < stop)
         keep = reached & test.may_hit(shape, *samples.parts(types, block * PARTS + part, exists))
         bits |= dr.select(keep, types.UInt(1 << part), 0)
-    counts, found = dr.zeros(types.UInt, columns * rows), dr.zeros(types.UInt, 1)
-    dr.make_opaque(counts, found)
-    slot: Any = dr.scatter_inc(found, types.UInt(0), bits != 0)
-    rank = dr.scatter_inc(counts, block, bits != 0)
-    names, numbers, parts, ranks = (dr.empty(types.UInt, most) for _ in range(4))
-    columns = ((names, item if by_item else triangle), (numbers, block), (parts, bits), (ranks, rank))
-    for target, value in columns:
-        dr.scatter(target, value, slot, bits != 0)
-    return Pairs(names, numbers, parts, ranks, counts, found)
-
-
-def list_pairs(types: Any, lanes: Any, pairs: Pairs, lists: Lists) -> Lists:
-    """Fill the lists, whose starts and counts are known; there may be more lanes than pairs."""
-    active = True if pairs.found is None else lanes < dr.gather(types.UInt, pairs.found, 0)
-    columns = (pairs.names, pairs.blocks, pairs.parts, pairs.ranks)
-    name, block, parts, rank = (dr.gather(types.UInt, column, lanes, active) for column in columns)
-    slot = dr.gather(types.UInt, lists.starts, block, active) + rank
-    dr.scatter(lists.entries, types.Array2u(name, parts), slot, active)
+    lists.add(types, lanes, block, item if by_item else triangle, bits, bits != 0)
     return lists

@@ -12,9 +12,8 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import cover, pixels, planes, skew
-from mpcam_kernels.blocks import Large, Lists, list_pairs
-from mpcam_kernels.blocks import Pairs as Listed
+from mpcam_kernels import blocks, cover, pixels, planes, skew
+from mpcam_kernels.blocks import Large, Lists
 from mpcam_kernels.bundles import Cones, joined
 from mpcam_kernels.candidates import CULLING, LANES, Candidates, Task, Tell
 from mpcam_kernels.frozen import frozen
@@ -56,8 +55,6 @@ class BundlePipeline:
         self.candidates = Candidates(types, culling)
         self._cover = frozen(self._cover_pass)
         self._walk = frozen(self._walk_pass)
-        self._listed = frozen(self._listed_pass)
-        self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
 
     def frame(self, task: Task, done: Tell | None = None) -> tuple[Any, Any]:
@@ -71,38 +68,33 @@ class BundlePipeline:
             setups, levels = self.candidates.triangles(task)
             tell("triangles", (setups, levels))
             everywhere = lanes(types, 0, self.blocks * PIXELS // pixels.PER_LANE)
-            for pairs, rows in self.pairs(task, setups, levels, canvas, tell):
-                many = dr.width(pairs.names)
-                lists = Lists(dr.empty(types.UInt, 2 * many), dr.prefix_sum(pairs.counts), pairs.counts)
-                lists = self._list(lanes(types, 0, many), pairs, lists)
+            bundle = task.bundle
+            for lists, rows in self.lists(task, setups, levels, canvas, tell):
                 tell("lists", lists)
-                large, bundle = Large(rows, setups, None), task.bundle
+                large = Large(rows, setups, None)
                 canvas.state = self._pixels(everywhere, bundle.pixels, bundle.corners, large, lists, canvas.state)
                 tell("pixels", canvas.state)
         buffer = self._blank() if canvas.state.buffer is None else canvas.state.buffer
         return buffer, canvas.state.counters
 
-    def pairs(
+    def lists(
         self, task: Task, setups: Rows, levels: list[Rows], canvas: Canvas, tell: Tell
-    ) -> Iterator[tuple[Listed, list[Any]]]:
-        """Pairs of a block and a triangle, in chunks, and what rows of regions they name (none here).
+    ) -> Iterator[tuple[Lists, list[Any]]]:
+        """Lists of triangles by block, for some at a time, and what rows of regions they name (none here).
 
         Small triangles go onto the canvas at once.
         """
-        types, slopes, walking = self.types, task.bundle.slopes, task.counts[0] > MANY
-        bundle = task.bundle
+        types, bundle, walking = self.types, task.bundle, task.counts[0] > MANY
         for found, number in self.candidates.met(task.counts, bundle.groups, levels, tell, (bundle, task.fan)):
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))
-                bits, small, listed = self._cover(lane, slopes, setups, found, walking)
+                empty = blocks.room(types, dr.width(lane), self.blocks)
+                small, lists = self._cover(lane, bundle.slopes, setups, found, walking, ROOM, empty)
                 few = dr.compress(small) if walking else types.UInt()
                 if dr.width(few):
-                    canvas.state = self._walk(few, lane, task.bundle.pixels, slopes, setups, found, canvas.state)
+                    canvas.state = self._walk(few, lane, bundle.pixels, bundle.slopes, setups, found, canvas.state)
                     tell("small", canvas.state)
-                many = dr.compress(listed)
-                tell("blocks", many)
-                if dr.width(many):
-                    yield self._listed(many, lane, found, bits), []
+                yield lists, []
 
     def _blank(self) -> Any:
         """Keys of places where nothing is hit."""
@@ -110,8 +102,10 @@ class BundlePipeline:
         dr.make_opaque(buffer)
         return buffer
 
-    def _cover_pass(self, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool) -> tuple[Any, Any, Any]:
-        return cover.covered(self.types, skew, lane, slopes, setups, pairs, walking)
+    def _cover_pass(
+        self, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
+    ) -> tuple[Any, Lists]:
+        return cover.covered(self.types, skew, lane, slopes, setups, pairs, walking, room, lists)
 
     def _walk_pass(
         self, chosen: Any, lane: Any, rays: Any, slopes: Rows, setups: Rows, pairs: Any, state: State
@@ -122,13 +116,6 @@ class BundlePipeline:
             self.types, skew, self.output, number, rays, slopes, setups, pairs, buffer, self.count
         )
         return State(buffer, self._counted(state.counters, counted))
-
-    def _listed_pass(self, chosen: Any, lane: Any, pairs: Any, bits: Any) -> Listed:
-        counts = dr.zeros(self.types.UInt, self.blocks)
-        return cover.listed(self.types, chosen, dr.gather(self.types.UInt, lane, chosen), pairs, bits, counts)
-
-    def _list_pass(self, lane: Any, pairs: Listed, lists: Lists) -> Lists:
-        return list_pairs(self.types, lane, pairs, lists)
 
     def _pixel_pass(self, lane: Any, rays: Any, corners: Any, large: Large, lists: Lists, state: State) -> State:
         buffer = self.blocks * PIXELS if state.buffer is None else state.buffer
@@ -166,17 +153,17 @@ class PlanePipeline(BundlePipeline):
         self._items = frozen(self._item_pass)
         self._chosen = frozen(self._chosen_pass)
         self._reached = frozen(self._reached_pass)
-        self._joined = frozen(self._joined_pass)
 
-    def pairs(
+    def lists(
         self, task: Task, setups: Rows, levels: list[Rows], canvas: Canvas, tell: Tell
-    ) -> Iterator[tuple[Listed, list[Any]]]:
-        """Pairs of a block and an item, in chunks, and the items' rows."""
+    ) -> Iterator[tuple[Lists, list[Any]]]:
+        """Lists of items by block, for some at a time, and the items' rows."""
         types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
         faces = lanes(types, 0, dr.width(found_planes.first))
         target = room(types, 2, dr.width(faces))
         cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, target))
         fan, cull = int(dr.max(found_planes.count)[0]), "triangles" in self.candidates.culling
+        most = LANES // fan * fan
         for found, number in self.candidates.met(task.counts, cones, levels, tell):
             # Regions are large, so few at a time.
             for start in range(0, number, ROOM):
@@ -189,12 +176,10 @@ class PlanePipeline(BundlePipeline):
                     continue
                 targets = [dr.empty(types.Float, 4 * many) for _ in rows]
                 items = self._chosen(lanes(types, 0, many), chosen, lane, rows, found, targets)
-                for first in range(0, many, max(1, LANES // fan)):
-                    lane = lanes(types, first * fan, min(many, first + max(1, LANES // fan)) * fan)
-                    item, block, bits = self._reached(lane, fan, found_planes, items, bundle.corners)
-                    some = dr.compress(bits != 0)
-                    if dr.width(some):
-                        yield self._joined(some, item, block, bits), items.rows
+                for first in range(0, many * fan, most):
+                    lane = lanes(types, first, min(many * fan, first + most))
+                    empty = blocks.room(types, dr.width(lane), self.blocks)
+                    yield self._reached(lane, fan, most, found_planes, items, bundle.corners, empty), items.rows
 
     def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, target: Rows) -> Rows:
         target.store(joined(self.types, cones, first, count), number)
@@ -211,11 +196,9 @@ class PlanePipeline(BundlePipeline):
             dr.scatter(target, dr.gather(self.types.Array4f, row, chosen), item)
         return planes.Items(targets, face)
 
-    def _reached_pass(self, lane: Any, fan: int, found: Any, items: Any, corners: Any) -> tuple[Any, Any, Any]:
-        return planes.reached(self.types, lane, fan, found, items, corners)
-
-    def _joined_pass(self, chosen: Any, item: Any, block: Any, bits: Any) -> Listed:
-        counts = dr.zeros(self.types.UInt, self.blocks)
-        item, block, bits = (dr.gather(self.types.UInt, values, chosen) for values in (item, block, bits))
-        dr.make_opaque(counts)
-        return Listed(item, block, bits, dr.scatter_inc(counts, block), counts)
+    def _reached_pass(
+        self, lane: Any, fan: int, most: int, found: Any, items: Any, corners: Any, lists: Lists
+    ) -> Lists:
+        item, block, bits = planes.reached(self.types, lane, fan, found, items, corners)
+        lists.add(self.types, lane % most, block, item, bits, bits != 0)
+        return lists

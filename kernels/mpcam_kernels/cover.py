@@ -8,7 +8,8 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import blocks, walk
+from mpcam_kernels import walk
+from mpcam_kernels.blocks import Lists
 from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
@@ -18,30 +19,23 @@ WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
 def covered(
-    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool
-) -> tuple[Any, Any, Any]:
-    """What of its block the triangle of each pair may cover.
+    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
+) -> tuple[Any, Lists]:
+    """Lists of the triangles of pairs by block, and with `walking` which pairs are small enough for a lane to walk.
 
-    Returns the parts as bits; whether it is small enough for a lane to walk (with `walking`); and whether it is for the
-    lists otherwise.
+    room: pairs at a time, of which `lane` has some.
     """
     block, triangle = pairs.at(lane)
     shape = test.unpack(setups.at(types, triangle))
     edges, front, back = _edges(types, shape, slopes, block)
     bits, small = _parts(types, edges, front, back), types.Bool(False)
+    some = bits != 0
     if walking:
         _, _, places = _box(types, _lines(types, edges, front))
-        small = (bits != 0) & ~(front & back) & (places <= SMALL)
-        return bits, small & (places > 0), (bits != 0) & ~small
-    return bits, small, bits != 0
-
-
-def listed(types: Any, chosen: Any, number: Any, pairs: Any, bits: Any, counts: Any) -> blocks.Pairs:
-    """Pairs by number, for the lists of their blocks. chosen: their places in `bits`. counts: zeros, one per block."""
-    block, triangle = pairs.at(number)
-    dr.make_opaque(counts)
-    rank = dr.scatter_inc(counts, block)
-    return blocks.Pairs(triangle, block, dr.gather(types.UInt, bits, chosen), rank, counts)
+        small = some & ~(front & back) & (places <= SMALL)
+        some, small = some & ~small, small & (places > 0)
+    lists.add(types, lane % room, block, triangle, bits, some)
+    return small, lists
 
 
 def walk_small(

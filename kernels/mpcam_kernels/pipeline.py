@@ -66,17 +66,16 @@ class Pipeline:
         self.width, self.height = size
         self.cull, self.bounded, self.pieces, self.count, self.small = cull, bounded, pieces, count, small
         self.columns, self.rows = blocks_of(*size)
-        self.pairs = max(PAIRS, PER_BLOCK * self.columns * self.rows)
+        self.pairs = min(max(PAIRS, PER_BLOCK * self.columns * self.rows), blocks.MOST)
         self._triangles = frozen(self._triangle_pass)
         self.squares = (-(-self.width // COARSE), -(-self.height // COARSE))
         self._find = frozen(self._find_pass)
-        self._refine = frozen(self._refine_pass)
         self._list = frozen(self._list_pass)
         self._pixels = frozen(self._pixel_pass)
 
     def thaw(self) -> None:
         """Record every frame anew, to see what freezing is worth."""
-        self._triangles, self._find, self._refine = self._triangle_pass, self._find_pass, self._refine_pass
+        self._triangles, self._find = self._triangle_pass, self._find_pass
         self._list, self._pixels = self._list_pass, self._pixel_pass
 
     @property
@@ -104,12 +103,12 @@ class Pipeline:
             dr.eval(buffer)
             return buffer, counters
         triangles = lanes(types, 0, dr.width(faces) // 3)
-        room = 4 * dr.width(triangles)
-        lists = [
-            [dr.empty(types.Float, room * self.pieces) for _ in range(3)],
-            [dr.empty(types.Float, room) for _ in range(self.test.ROWS)],
+        numbers = 4 * dr.width(triangles)
+        rows = [
+            [dr.empty(types.Float, numbers * self.pieces) for _ in range(3)],
+            [dr.empty(types.Float, numbers) for _ in range(self.test.ROWS)],
         ]
-        buffer, large, counters = self._triangles(triangles, camera, vertices, faces, samples, counters, lists)
+        buffer, large, counters = self._triangles(triangles, camera, vertices, faces, samples, counters, rows)
         if done:
             done("triangles", (buffer, large))
         items = large.count[0]
@@ -125,9 +124,8 @@ class Pipeline:
                 continue
             if needed:
                 candidates = lanes(types, 0, needed)
-                pairs = self._refine(candidates, samples, large, squares)
-                lists = blocks.Lists(dr.empty(types.UInt, 2 * needed), dr.prefix_sum(pairs.counts), pairs.counts)
-                lists = self._list(candidates, pairs, lists)
+                room = blocks.room(types, needed, self.columns * self.rows)
+                lists = self._list(candidates, samples, large, squares, room)
                 if done:
                     done("lists", lists)
                 everywhere = lanes(types, 0, self.places // pixels.PER_LANE)
@@ -145,12 +143,12 @@ class Pipeline:
         faces: Any,
         samples: Samples,
         counters: Any,
-        lists: list[list[Any]],
+        rows: list[list[Any]],
     ) -> tuple[Any, blocks.Large, Any]:
         types, test = self.types, self.test
         buffer = dr.zeros(self.output.kind(types), self.places)
         dr.make_opaque(buffer)
-        large = blocks.Large(lists[0], lists[1], dr.zeros(types.UInt, 1))
+        large = blocks.Large(rows[0], rows[1], dr.zeros(types.UInt, 1))
         corners = dr.gather(types.Array3u, faces, triangle)
         first = [dr.gather(types.Array4f, vertices[0], corner) for corner in corners]
         points = [row.xyz for row in first]
@@ -160,11 +158,11 @@ class Pipeline:
             shown = shown & ((turn < 0) if self.cull == "back" else (turn > 0))
 
         def outlined(tests: Any, hits: Any) -> tuple[Any, Any]:
-            rows = [
+            given = [
                 [row, *(dr.gather(types.Array4f, r, n) for r in vertices[1:])]
                 for row, n in zip(first, corners, strict=True)
             ]
-            for outline in self.outline(camera, rows):
+            for outline in self.outline(camera, given):
                 area, seen = region(types, outline, self.width, self.height)
 
                 def covered(tests: Any, hits: Any, area: Any = area, seen: Any = seen) -> tuple[Any, Any]:
@@ -191,14 +189,11 @@ class Pipeline:
         most = self.pairs // blocks.BLOCKS
         return blocks.find_squares(self.types, self._picker, lanes, per_item, samples, large, self.squares[0], most)
 
-    def _refine_pass(self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares) -> blocks.Pairs:
+    def _list_pass(
+        self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares, lists: blocks.Lists
+    ) -> blocks.Lists:
         grid = (self.columns, self.rows)
-        return blocks.find_pairs(
-            self.types, self._picker, lanes, samples, large, grid, squares, self.pairs, self.bounded
-        )
-
-    def _list_pass(self, lanes: Any, pairs: blocks.Pairs, lists: blocks.Lists) -> blocks.Lists:
-        return blocks.list_pairs(self.types, lanes, pairs, lists)
+        return blocks.list_blocks(self.types, self._picker, lanes, samples, large, grid, squares, lists, self.bounded)
 
     @property
     def _picker(self) -> Any:

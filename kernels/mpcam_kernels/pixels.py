@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
-from mpcam_kernels.blocks import Large, Lists, set_up
+from mpcam_kernels.blocks import LINK, Large, Lists, set_up
 from mpcam_kernels.samples import PARTS, PIXELS
 
 PER_LANE = 8  # pixels of a lane, two rows of a part: a set-up that is gathered serves eight tests in registers
@@ -46,8 +46,7 @@ def through_lists(
         before = [key for at in fours for key in dr.gather(four, buffer, at)]
         result = dr.empty(type(buffer), dr.width(buffer))
     x, y = corner(place) if bounded else (place, place)
-    start = dr.gather(types.UInt, lists.starts, block)
-    end = start + dr.gather(types.UInt, lists.counts, block)
+    start = lists.first(types, block)
 
     def allowed(number: Any, mask: Any) -> list[Any]:
         """Which pixels of the lane to test against a triangle."""
@@ -62,18 +61,18 @@ def through_lists(
             inside += [within & (types.Int(x + k) >= first) & (types.Int(x + k) < last) for k in range(4)]
         return inside
 
-    def sought(index: Any) -> Any:
+    def sought(number: Any) -> Any:
         """The next entry for the lane's part: looking on is cheap, a test with most lanes idle is not."""
 
-        def look(index: Any, found: Any) -> Any:
-            bits = dr.gather(types.UInt, lists.entries, 2 * index + 1, index < end)
-            found = ((bits >> part) & 1) != 0
-            return dr.select(found, index, index + 1), found
+        def look(number: Any, found: Any) -> Any:
+            link = lists.link(types, number)
+            found = ((link >> part) & 1) != 0
+            return dr.select(found, number, link // LINK), found
 
-        return dr.while_loop((index, types.Bool(False)), lambda index, found: ~found & (index < end), look)[0]
+        return dr.while_loop((number, types.Bool(False)), lambda number, found: ~found & (number > 0), look)[0]
 
-    def body(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        name, mask = dr.gather(types.UInt, lists.entries, 2 * index), True
+    def body(best: Any, owners: Any, tests: Any, hits: Any, number: Any) -> Any:
+        name, mask = lists.name(types, number), True
         triangle = name
         if bounded:
             triangle = dr.reinterpret_array(types.UInt, dr.gather(types.Float, large.regions[2], name * 4 + 3))
@@ -95,10 +94,10 @@ def through_lists(
                 nearest.append(best[k] | covered)
             if count:
                 tests, hits = tests + dr.select(possible, types.UInt(1), 0), hits + dr.select(covered, 1, 0)
-        return nearest, first, tests, hits, sought(index + 1)
+        return nearest, first, tests, hits, sought(lists.link(types, number) // LINK)
 
-    def unfinished(best: Any, owners: Any, tests: Any, hits: Any, index: Any) -> Any:
-        return (index < end) if output.depth else (index < end) & ~functools.reduce(operator.and_, best)
+    def unfinished(best: Any, owners: Any, tests: Any, hits: Any, number: Any) -> Any:
+        return (number > 0) if output.depth else (number > 0) & ~functools.reduce(operator.and_, best)
 
     # A test of nearness 0 is no hit, but ties with nothing, which has it too: such an owner is masked below.
     owners = [output.triangle(types, key) for key in before] if hasattr(output, "triangle") else []
@@ -110,7 +109,7 @@ def through_lists(
 
     state = (best, owners, types.UInt(0), types.UInt(0))
     # Many blocks have no list: they need no samples.
-    best, owners, tests, hits = dr.if_stmt(state, start < end, draw, lambda *state: state)
+    best, owners, tests, hits = dr.if_stmt(state, start > 0, draw, lambda *state: state)
     if output.depth:
         keys = [output.key(types, near, owners[k] if owners else None) for k, near in enumerate(best)]
         keys = [dr.select(near > 0, key, 0) for near, key in zip(best, keys, strict=True)]
