@@ -50,6 +50,8 @@ class Candidates:
         self._clusters = frozen(self._cluster_pass)
         self._mark = frozen(self._mark_pass)
         self._keep = frozen(self._keep_pass)
+        self._look = frozen(self._look_pass)
+        self._write = frozen(self._write_pass)
 
     def triangles(self, task: Task) -> tuple[Rows, list[Rows]]:
         """Set-ups of the triangles, and the balls around them and, level by level, around clusters."""
@@ -88,16 +90,21 @@ class Candidates:
             if groups and (level == 0 or FAN**level <= GROUPED):
                 (bundle, fan), below = groups, level
                 step, around, groups = ("groups", fan, bundle.first, bundle.count), bundle.cones, None
+                found = self._marked(number, fan, step, around, levels[level], pairs, self._culls(level), tell)
             else:
-                step, fan, below = ("clusters", counts[level - 1]), FAN, level - 1
-            for after in self._passed(number, fan, step, around, levels[below], pairs, self._culls(below), tell):
+                below = level - 1
+                found = self._refined(number, around, levels[below], counts[below], pairs, self._culls(below), tell)
+            for after in found:
                 yield from down(below, groups, around, *after)
 
         step, pairs = ("all", counts[top]), cones.items * counts[top]
-        for after in self._passed(pairs, 1, step, cones, levels[top], None, self._culls(top), tell):
+        for after in self._marked(pairs, 1, step, cones, levels[top], None, self._culls(top), tell):
             yield from down(top, split, cones, *after)
 
-    def _passed(
+    def _culls(self, level: int) -> bool:
+        return "triangles" in self.culling if level == 0 else True
+
+    def _marked(
         self,
         number: int,
         fan: int,
@@ -108,7 +115,7 @@ class Candidates:
         cull: bool,
         tell: Any,
     ) -> Iterator[tuple[Known, int]]:
-        """A step over all pairs, a lane for each of their `fan` children, in chunks."""
+        """A step with a lane for each of the `fan` bundles of a pair (see `hierarchy.children`), in chunks."""
         many = max(1, LANES // fan)
         for start in range(0, number, many):
             lane = lanes(self.types, start * fan, min(number, start + many) * fan)
@@ -120,16 +127,35 @@ class Candidates:
             elif found:
                 yield self._keep(chosen, lane, step, before), found
 
-    def _culls(self, level: int) -> bool:
-        return "triangles" in self.culling if level == 0 else True
+    def _refined(
+        self, number: int, cones: Cones, balls: Rows, count: int, before: Known, cull: bool, tell: Any
+    ) -> Iterator[tuple[Known, int]]:
+        """A step from clusters to their children, `count` in all, with a lane for each pair, in chunks."""
+        types, many = self.types, LANES // FAN
+        for start in range(0, number, many):
+            lane = lanes(types, start, min(number, start + many))
+            masks, found = self._look(lane, cones, before, balls, count, cull)
+            ends = dr.cumsum(found)
+            total = int(ends[-1])
+            tell("candidates", ends)
+            if total:
+                targets = Pairs(dr.empty(types.UInt, total), dr.empty(types.UInt, total))
+                yield self._write(lane, before, masks, ends, targets), total
 
     def _mark_pass(self, lane: Any, step: Any, cones: Cones, balls: Rows, before: Any, cull: bool) -> Any:
         bundle, ball, exists = hierarchy.children(lane, step, before)
-        return hierarchy.meeting(self.types, cones, bundle, balls, ball, exists, cull)
+        return hierarchy.meeting(self.types, cones(self.types, bundle, exists), balls, ball, exists, cull)
 
     def _keep_pass(self, chosen: Any, lane: Any, step: Any, before: Any) -> Pairs:
         bundle, ball, _ = hierarchy.children(dr.gather(self.types.UInt, lane, chosen), step, before)
         return Pairs(bundle, ball)
+
+    def _look_pass(self, lane: Any, cones: Cones, before: Any, balls: Rows, count: int, cull: bool) -> tuple[Any, Any]:
+        return hierarchy.met_children(self.types, cones, before, lane, balls, count, cull)
+
+    def _write_pass(self, lane: Any, before: Any, masks: Any, ends: Any, targets: Pairs) -> Pairs:
+        hierarchy.write_children(self.types, before, lane, masks, ends - dr.popcnt(masks), targets)
+        return targets
 
     def _set_up_pass(self, triangle: Any, vertices: Any, faces: Any, names: Any, targets: Any) -> Any:
         types = self.types

@@ -1,8 +1,9 @@
 """Which triangles a block of rays may hit: down through groups of blocks and clusters of triangles, step by step.
 
 Every step takes pairs of a bundle and a ball, refines one of the two, and marks the pairs that may meet. The balls are
-those around the triangles and, level by level, around eight of the level below. Marks are gathered into new pairs by a
-prefix sum, which is quicker than a counter that all threads raise, and keeps the order.
+those around the triangles and, level by level, around FAN of the level below: of these a lane looks at all, since they
+share the bundle, and marks them in a mask; of a group's blocks each has its lane. Marks become new pairs by a prefix
+sum, which is quicker than a counter that all threads raise, and keeps the order.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels.bundles import Cones, may_meet
+from mpcam_kernels.bundles import Cone, Cones, may_meet
 from mpcam_kernels.rows import Rows
 
 FAN = 8  # children of a cluster
@@ -60,10 +61,10 @@ def cluster_balls(types: Any, cluster: Any, balls: Rows, count: int) -> Any:
     return types.Array4f(*centre, radius)
 
 
-def meeting(types: Any, cones: Cones, bundle: Any, balls: Rows, ball: Any, exists: Any, cull: bool) -> Any:
+def meeting(types: Any, cone: Cone, balls: Rows, ball: Any, exists: Any, cull: bool) -> Any:
     """Whether bundles and balls may meet; without `cull`, whether there are both."""
     if cull:
-        return exists & may_meet(cones(types, bundle, exists), *balls.at(types, ball, exists))
+        return exists & may_meet(cone, *balls.at(types, ball, exists))
     return exists & (dr.gather(types.Float, balls.flat, ball * 4 + 3, exists) >= 0)
 
 
@@ -71,19 +72,39 @@ def children(lane: Any, step: tuple[Any, ...], before: Any) -> tuple[Any, Any, A
     """Bundle and ball of each lane of a step from pairs `before`, and whether there are such.
 
     step: ("all", clusters): all pairs that there are; ("groups", fan, first, count): from a group to its blocks, which
-    begin at `first`, `fan` at most; ("clusters", count): from a cluster to its children, of which there are `count`.
+    begin at `first`, `fan` at most.
     """
     name, *rest = step
     if name == "all":
         return lane // rest[0], lane % rest[0], True
-    if name == "groups":
-        fan, first, count = rest
-        group, ball = before.at(lane // fan)
-        k = lane % fan
-        return dr.gather(type(lane), first, group) + k, ball, k < dr.gather(type(lane), count, group)
-    bundle, cluster = before.at(lane // FAN)
-    child = cluster * FAN + lane % FAN
-    return bundle, child, child < rest[0]
+    fan, first, count = rest
+    group, ball = before.at(lane // fan)
+    k = lane % fan
+    return dr.gather(type(lane), first, group) + k, ball, k < dr.gather(type(lane), count, group)
+
+
+def met_children(
+    types: Any, cones: Cones, pairs: Any, lane: Any, balls: Rows, count: int, cull: bool
+) -> tuple[Any, Any]:
+    """Which children of the clusters of pairs may meet the bundles, as a mask, and how many. count: of all balls."""
+    bundle, cluster = pairs.at(lane)
+    cone, mask = cones(types, bundle), types.UInt(0)
+    for k in range(FAN):
+        child = cluster * FAN + k
+        mask |= dr.select(meeting(types, cone, balls, child, child < count, cull), types.UInt(1 << k), 0)
+    return mask, dr.popcnt(mask)
+
+
+def write_children(types: Any, pairs: Any, lane: Any, mask: Any, place: Any, targets: Pairs) -> None:
+    """Write the pairs of bundles and children in masks, from a place on."""
+    bundle, cluster = pairs.at(lane)
+
+    def body(mask: Any, place: Any) -> tuple[Any, Any]:
+        dr.scatter(targets.bundles, bundle, place)
+        dr.scatter(targets.balls, cluster * FAN + dr.tzcnt(mask), place)
+        return mask & (mask - 1), place + 1
+
+    dr.while_loop((mask, place), lambda mask, place: mask != 0, body)
 
 
 @dataclass(frozen=True)
