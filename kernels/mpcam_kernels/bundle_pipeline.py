@@ -14,12 +14,11 @@ import drjit as dr
 
 from mpcam_kernels import blocks, cover, pixels, planes, skew
 from mpcam_kernels.blocks import Large, Lists
-from mpcam_kernels.bundles import Cones, joined
 from mpcam_kernels.candidates import CULLING, LANES, Candidates, Task, Tell
 from mpcam_kernels.frozen import frozen
 from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
-from mpcam_kernels.rows import Rows, room
+from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import PIXELS, of_block
 
 ROOM = 1 << 20  # pairs of a block and a triangle at a time
@@ -149,7 +148,6 @@ class PlanePipeline(BundlePipeline):
     def __init__(self, types: Any, blocks: int, bound: str, **settings: Any):
         super().__init__(types, blocks, **settings)
         self.bound = bound
-        self._around = frozen(self._around_pass)
         self._items = frozen(self._item_pass)
         self._chosen = frozen(self._chosen_pass)
         self._reached = frozen(self._reached_pass)
@@ -159,12 +157,9 @@ class PlanePipeline(BundlePipeline):
     ) -> Iterator[tuple[Lists, list[Any]]]:
         """Lists of items by block, for some at a time, and the items' rows."""
         types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
-        faces = lanes(types, 0, dr.width(found_planes.first))
-        target = room(types, 2, dr.width(faces))
-        cones = Cones(self._around(faces, bundle.cones, found_planes.first, found_planes.count, target))
-        fan, cull = int(dr.max(found_planes.count)[0]), "triangles" in self.candidates.culling
+        fan, cull = found_planes.fan, "triangles" in self.candidates.culling
         most = LANES // fan * fan
-        for found, number in self.candidates.met(task.counts, cones, levels, tell):
+        for found, number in self.candidates.met(task.counts, found_planes.cones, levels, tell):
             # Regions are large, so few at a time.
             for start in range(0, number, ROOM):
                 lane = lanes(types, start, min(number, start + ROOM))
@@ -180,10 +175,6 @@ class PlanePipeline(BundlePipeline):
                     lane = lanes(types, first, min(many * fan, first + most))
                     empty = blocks.room(types, dr.width(lane), self.blocks)
                     yield self._reached(lane, fan, most, found_planes, items, bundle.corners, empty), items.rows
-
-    def _around_pass(self, number: Any, cones: Cones, first: Any, count: Any, target: Rows) -> Rows:
-        target.store(joined(self.types, cones, first, count), number)
-        return target
 
     def _item_pass(self, lane: Any, found: Any, vertices: Any, faces: Any, pairs: Any, cull: bool) -> Any:
         return planes.items(self.types, self.bound, lane, found, vertices, faces, pairs, cull)

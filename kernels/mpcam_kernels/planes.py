@@ -10,6 +10,7 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
+from mpcam_kernels.bundles import Cones
 from mpcam_kernels.samples import PART, PARTS
 
 
@@ -17,7 +18,8 @@ from mpcam_kernels.samples import PART, PARTS
 class Planes:
     """Camera triangles. maps: three rows of four numbers each, point (x, y, z, 1) to u, v and height. slopes: per
     generator two numbers. state: 1 or -1, the side that rays leave on; 0 where generators bound nothing. lines: six
-    numbers, the outward normals of a bounding triangle. side: pixels along the short sides. first, count: blocks.
+    numbers, the outward normals of a bounding triangle. side: pixels along the short sides. first, count: blocks, of
+    which no camera triangle has more than `fan`. cones: of all rays of each.
     """
 
     maps: list[Any]
@@ -27,6 +29,8 @@ class Planes:
     side: Any
     first: Any
     count: Any
+    fan: int
+    cones: Cones
 
 
 @dataclass(frozen=True)

@@ -134,8 +134,6 @@ class DeviceRays:
     """
 
     def __init__(self, camera: CameraTriangles, device: DeviceMesh, planes: bool = False):
-        import drjit as dr
-
         t = types()
         self.device = device
         self.layout: Layout = layout(camera.atlas)
@@ -154,8 +152,7 @@ class DeviceRays:
                 bent["index"] = opaque_numbers([float(camera.index)])[0]
         self.bundle = _frozen_rays(camera.kind)(*fixed["lanes"], fixed, rows, bent)
         if planes:
-            found = _planes(camera, device, pose, centre, fixed)
-            dr.make_opaque(found)
+            found = _planes(camera, device, pose, centre, fixed, self.bundle.cones)
             self.bundle = replace(self.bundle, planes=found)
 
     @functools.cached_property
@@ -207,10 +204,17 @@ def _on_device(found: Layout, atlas: Any) -> dict[str, Any]:
     return fixed
 
 
-def _planes(camera: CameraTriangles, device: DeviceMesh, pose: np.ndarray, centre: np.ndarray, fixed: Any) -> Any:
-    """What bounds images on the camera triangles' planes, in the mesh's frame."""
+def _planes(
+    camera: CameraTriangles, device: DeviceMesh, pose: np.ndarray, centre: np.ndarray, fixed: Any, blocks: Any
+) -> Any:
+    """What bounds images on the camera triangles' planes, in the mesh's frame. blocks: cones of the blocks' rays."""
+    import drjit as dr
+
     from mpcam.cameras.generators import plane_bounds
+    from mpcam_kernels.bundles import Cones, joined
+    from mpcam_kernels.lanes import lanes
     from mpcam_kernels.planes import Planes
+    from mpcam_kernels.rows import room
 
     t, found = types(), plane_bounds(camera)
     # Mesh's frame to camera frame, then to the plane; heights in the mesh's unit.
@@ -224,15 +228,22 @@ def _planes(camera: CameraTriangles, device: DeviceMesh, pose: np.ndarray, centr
 
     slopes = [flat(found.slopes[:, k] * device.scale) for k in range(found.slopes.shape[1])]
     sides = np.broadcast_to(np.asarray(camera.resolution), (camera.count,))
-    return Planes(
+    first, count = fixed["face_first"], fixed["face_count"]
+    around = room(t, 2, camera.count)
+    around.store(joined(t, blocks, first, count), lanes(t, 0, camera.count))
+    result = Planes(
         [flat(maps[:, row]) for row in range(3)],
         slopes,
         flat(found.state),
         flat(found.lines),
         t.UInt(np.ascontiguousarray(sides, np.uint32)),
-        fixed["face_first"],
-        fixed["face_count"],
+        first,
+        count,
+        int(dr.max(count)[0]),
+        Cones(around),
     )
+    dr.make_opaque(result)
+    return result
 
 
 @functools.cache
