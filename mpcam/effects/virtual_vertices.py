@@ -19,8 +19,9 @@ from mpcam.decomposition.decompose import directions_at_vertices
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
-from mpcam.rendering.bundled import corner_rays, levels
+from mpcam.rendering.bundled import levels
 from mpcam.rendering.device import opaque_zero, placed, types
+from mpcam.rendering.device_rays import corner_rays
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 

@@ -19,7 +19,7 @@ from mpcam.truth.variant import mitsuba
 def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
     """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
     if isinstance(camera, CameraTriangles):
-        from mpcam.rendering.bundled import DeviceRays
+        from mpcam.rendering.device_rays import DeviceRays
 
         return DeviceRays(camera, device).in_rows()
     origin, direction, valid = lens(camera).ray
