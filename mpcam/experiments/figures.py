@@ -92,5 +92,9 @@ def plain_ticks(axis: Any) -> None:
 
     low, high = axis.get_view_interval()
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}" if value >= 1 else f"{value:g}"))
+
+    def plain(value: float, _: int) -> str:
+        return f"{value:,.3f}".rstrip("0").rstrip(".") if value >= 1 else f"{value:g}"
+
+    axis.set_major_formatter(FuncFormatter(plain))
     axis.set_minor_formatter(NullFormatter())
