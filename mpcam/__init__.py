@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
     from mpcam.decomposition.chained import Chained as Chained
-    from mpcam.decomposition.chained import chained as chained
+    from mpcam.decomposition.chaining import chained as chained
     from mpcam.decomposition.decompose import decompose as decompose
     from mpcam.decomposition.decompose import subdivided as subdivided
     from mpcam.decomposition.ray_error import RayError as RayError
@@ -86,7 +86,8 @@ _HOMES = {
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
-    "mpcam.decomposition.chained": "Chained chained",
+    "mpcam.decomposition.chained": "Chained",
+    "mpcam.decomposition.chaining": "chained",
     "mpcam.decomposition.decompose": "decompose subdivided",
     "mpcam.decomposition.ray_error": "RayError ray_error",
     "mpcam.decomposition.resolve": "Resolver resolve",

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mpcam as mp
-from mpcam.decomposition.chained import Chained, chained
+from mpcam.decomposition.chained import Chained
+from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.ray_error import bent
 from mpcam.decomposition.reflector import reflector_of

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 
 import mpcam as mp
-from mpcam.decomposition.chained import chained
+from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.resolve import Resolver
 from mpcam.geometry.surfaces import Surface

@@ -15,7 +15,8 @@ import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.decomposition.chained import Chained, chained
+from mpcam.decomposition.chained import Chained
+from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.effects import caustic_kernels as kernels
