@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 import mpcam
@@ -99,6 +100,15 @@ def test_every_page_is_in_the_table_of_contents():
 def test_every_figure_is_drawn_and_shown():
     shown = re.findall(r"^```\{plot\} (\w+)\n:alt: \S", "\n".join(page.read_text() for page in PAGES), re.MULTILINE)
     assert sorted(shown) == sorted(path.stem for path in (DOCS / "figures").glob("*.py"))
+
+
+def test_the_figure_of_blocks_reads_the_kernels_lists(monkeypatch):
+    """It looks into what the kernels hand on, which may change without notice."""
+    monkeypatch.syspath_prepend(str(DOCS / "figures"))
+    blocks = importlib.import_module("blocks")
+    for name in blocks.TRIANGLES:
+        shares = np.bincount(blocks.states(name)[0].astype(int).ravel(), minlength=4) / blocks.SIZE**2
+        assert (shares[[blocks.OUTSIDE, blocks.TESTED, blocks.HIT]] > 0.004).all()
 
 
 def test_nothing_is_fetched():

@@ -61,3 +61,60 @@ def test_frames_of_another_mesh_have_their_own_size(output):
             same = frame.mask & (frame.triangle == truth.triangle)
             assert (frame.triangle != truth.triangle).mean() <= 5e-4
             assert np.abs(frame.barycentric - truth.barycentric)[same].max() < 2e-2
+
+
+NUMBERS = """
+import drjit as dr
+import drjit.llvm as types
+from mpcam_kernels.frozen import frozen
+
+def scaled(x, once, twice, last):
+    return x * last
+
+kernel, x = {wrapper}(scaled), types.UInt([1, 2, 3])
+print([kernel(x, 1, 2, last).numpy().tolist() for last in (2, 1)])
+"""
+
+
+def _numbers(wrapper: str) -> str:
+    script = NUMBERS.format(wrapper=wrapper)
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120).stdout
+
+
+def test_numbers_that_came_before_are_told_apart():
+    assert _numbers("frozen").strip() == "[[2, 4, 6], [1, 2, 3]]"
+
+
+def test_without_care_one_would_be_taken_for_the_other():
+    """Once this fails, Dr.Jit has mended it, and `frozen` need not put the numbers into a text any more."""
+    assert _numbers("dr.freeze").strip() == "[[2, 4, 6], [2, 4, 6]]"
+
+
+def test_many_cameras_and_meshes_in_one_process():
+    """Recordings of some sizes do not serve others: camera triangles of all sizes, each frame against traced rays."""
+    rng = np.random.default_rng(1)
+    for _ in range(120):
+        count, triangles = int(rng.choice([1, 2, 5, 30, 120])), int(rng.choice([1, 2, 3, 9, 300]))
+        corners = 0.2 * rng.normal(size=(count, 3, 3)) + rng.normal(size=(count, 1, 3))
+        corners[..., 2] *= 0.2
+        ways = 0.3 * rng.normal(size=(count, 1, 3)) + 0.1 * rng.normal(size=(count, 3, 3)) + [0, 0, 1]
+        camera = mp.CameraTriangles(
+            corners.reshape(-1, 3),
+            np.arange(3 * count).reshape(-1, 3),
+            directions=ways.reshape(-1, 3),
+            resolution=int(rng.choice([2, 3, 8, 17])),
+        )
+        points = rng.normal(size=(triangles, 1, 3)) * [1.5, 1.5, 0.5] + [0, 0, 2.5]
+        points = points + rng.normal(size=(triangles, 3, 3)) * rng.choice([0.05, 0.4, 1.0])
+        mesh = mp.Mesh(points.reshape(-1, 3), np.arange(3 * triangles).reshape(-1, 3))
+        truth = mp.rasterize(camera, mesh, method="raytrace").triangle
+        for settings in (
+            {},
+            {"bound": "triangle"},
+            {"bound": "nine_point"},
+            {"culling": ()},
+            {"culling": ("objects",)},
+        ):
+            if not settings or rng.random() < 0.3:
+                found = mp.rasterize(camera, mesh, **settings).triangle
+                assert (found != truth).sum() <= max(3, 0.003 * truth.size), (count, triangles, settings)

@@ -13,6 +13,7 @@ import mpcam as mp
 from mpcam.rendering.device import types
 from mpcam.rendering.invert import Inverted
 from mpcam_kernels import regions
+from mpcam_kernels.blocks import LINK
 from mpcam_kernels.samples import HEIGHT, PART, PARTS, WIDTH
 
 SIZE = 160
@@ -31,8 +32,9 @@ def listed(mesh):
     prepared.run(prepared.place(prepared.vertices), found.setdefault)
     rows = [dr.gather(t.Array4f, row, t.UInt(0)) for row in found["triangles"][1].regions]
     lists = found["lists"]
-    starts, counts, entries = (np.asarray(array.numpy()) for array in (lists.starts, lists.counts, lists.entries))
-    bits = np.where(counts > 0, entries[2 * np.minimum(starts, len(entries) // 2 - 1) + 1], 0)
+    heads, entries = (np.asarray(array.numpy()) for array in (lists.heads, lists.entries))
+    links = np.append(entries.reshape(-1, 2)[:, 1], 0)[heads.astype(np.int64) - 1]  # no entry: the last, 0
+    bits = links % LINK
     return regions.unpack(t, rows)[0], (bits[:, None] >> np.arange(PARTS)) & 1 > 0
 
 

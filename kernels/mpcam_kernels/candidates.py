@@ -1,4 +1,4 @@
-"""Pairs of a bundle of rays and a triangle that may meet, in chunks of bounded memory."""
+"""Pairs of a bundle of rays and a triangle, or a point, that may meet, in chunks of bounded memory."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from mpcam_kernels.rows import Rows, room
 
 LANES = 1 << 22  # at a time
 FLEETING = 1 << 15  # pairs up to which they are worked out again rather than written down
+NO_LANE = 0xFFFFFFFF
 GROUPED = 64  # triangles of the clusters with which groups of blocks are left for blocks
 CULLING = ("objects", "triangles")
 
@@ -35,10 +36,11 @@ class Task:
 
 
 Known = Pairs | Chosen
+Tell = Callable[[str, Any], None]
 
 
 class Candidates:
-    """Steps from all pairs down to those of a block, or a camera triangle, and a triangle; frozen.
+    """Steps from all pairs down to those of a block, or a camera triangle, and a triangle or a point; frozen.
 
     culling: what is left out early (Hou et al. 2006, section 2.4): "objects" holds clusters of triangles against
     bundles of rays, "triangles" each triangle by itself; without them all pairs are looked at.
@@ -73,7 +75,7 @@ class Candidates:
         counts: tuple[int, ...],
         cones: Cones,
         levels: list[Rows],
-        tell: Any,
+        tell: Tell | None = None,
         split: tuple[Bundle, int] | None = None,
     ) -> Iterator[tuple[Known, int]]:
         """Pairs of a bundle and a ball that may meet, in chunks, and how many there are.
@@ -81,6 +83,7 @@ class Candidates:
         cones: of the bundles to begin with. split: they are the groups of these rays, with so many blocks at most, and
         blocks take their place on the way down. tell(stage, arrays) is told after each step.
         """
+        tell = tell or _untold
         top = len(levels) - 1
 
         def down(level: int, groups: Any, around: Cones, pairs: Known, number: int) -> Iterator[tuple[Known, int]]:
@@ -113,7 +116,7 @@ class Candidates:
         balls: Rows,
         before: Known | None,
         cull: bool,
-        tell: Any,
+        tell: Tell,
     ) -> Iterator[tuple[Known, int]]:
         """A step with a lane for each of the `fan` bundles of a pair (see `hierarchy.children`), in chunks."""
         many = max(1, LANES // fan)
@@ -128,7 +131,7 @@ class Candidates:
                 yield self._keep(chosen, lane, step, before), found
 
     def _refined(
-        self, number: int, cones: Cones, balls: Rows, count: int, before: Known, cull: bool, tell: Any
+        self, number: int, cones: Cones, balls: Rows, count: int, before: Known, cull: bool, tell: Tell
     ) -> Iterator[tuple[Known, int]]:
         """A step from clusters to their children, `count` in all, with a lane for each pair, in chunks."""
         types, many = self.types, LANES // FAN
@@ -144,7 +147,8 @@ class Candidates:
 
     def _mark_pass(self, lane: Any, step: Any, cones: Cones, balls: Rows, before: Any, cull: bool) -> Any:
         bundle, ball, exists = hierarchy.children(lane, step, before)
-        return hierarchy.meeting(self.types, cones(self.types, bundle, exists), balls, ball, exists, cull)
+        met = hierarchy.meeting(self.types, cones(self.types, bundle, exists), balls, ball, exists, cull)
+        return met & (lane != NO_LANE)  # of one triangle that is not looked at, all marks would be one number
 
     def _keep_pass(self, chosen: Any, lane: Any, step: Any, before: Any) -> Pairs:
         bundle, ball, _ = hierarchy.children(dr.gather(self.types.UInt, lane, chosen), step, before)
@@ -172,4 +176,5 @@ class Candidates:
         return target
 
 
-Tell = Callable[[str, Any], None]
+def _untold(stage: str, arrays: Any) -> None:
+    """Nobody times the stages."""

@@ -1,4 +1,4 @@
-"""Which triangles a block of rays may hit: down through groups of blocks and clusters of triangles, step by step.
+"""Which triangles, or points, a bundle of rays may meet: through groups of blocks and clusters of balls, step by step.
 
 Every step takes pairs of a bundle and a ball, refines one of the two, and marks the pairs that may meet. The balls are
 those around the triangles and, level by level, around FAN of the level below: of these a lane looks at all, since they

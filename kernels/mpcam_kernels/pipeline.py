@@ -24,9 +24,8 @@ from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of, place
 from mpcam_kernels.samples import blocks as blocks_of
 
 SMALL = 96  # pixels in a region that one lane walks by itself
-PAIRS = (
-    1 << 18
-)  # item-block pairs held at a time, or PER_BLOCK for each block if these are more; the rest comes in chunks
+# Pairs of an item and a block held at a time, or PER_BLOCK for each block if these are more; the rest comes in chunks.
+PAIRS = 1 << 18
 PER_BLOCK = 4
 LANES = 1 << 22  # of those that look for pairs, at a time
 

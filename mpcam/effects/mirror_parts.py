@@ -31,18 +31,27 @@ class Part(Protocol):
         ...
 
 
-class ByTriangles:
+class Direct:
+    """The colours of first hits, one for each pixel of the eye."""
+
+    def __init__(self, whole: "Reflection", prepared: Any):
+        self.whole, self.prepared = whole, prepared
+
+    def update(self, vertices: np.ndarray) -> None:
+        self.prepared.update(vertices)
+
+    def colours(self) -> list[Any]:
+        return list(self.whole.shaded(self.prepared.frame()))
+
+
+class ByTriangles(Direct):
     """The scene through camera triangles, brought to the eye's pixels."""
 
     def __init__(self, whole: "Reflection", triangles: int, resolution: int, cams: CameraTriangles | None):
         self.cams = decomposed(whole, triangles, resolution) if cams is None else cams
-        self.whole = whole
+        super().__init__(whole, prepare(self.cams, whole.scene.mesh))
         self.resolver = Resolver(self.cams, whole.mirror.surface, whole.camera)
-        self.prepared = prepare(self.cams, whole.scene.mesh)
         self._nothing = opaque_numbers([0.0, 0.0, 0.0])
-
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
 
     def colours(self) -> list[Any]:
         import drjit as dr
@@ -84,35 +93,21 @@ def _look_up() -> Any:
     return looked_up
 
 
-class ByTracing:
+class ByTracing(Direct):
     """The scene along the rays of the true surface."""
 
     def __init__(self, whole: "Reflection"):
         from mpcam.truth.raytrace import RayTraced
 
-        self.whole = whole
-        self.prepared = RayTraced(whole.camera, whole.scene.mesh, whole.rays.ray)
-
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
-
-    def colours(self) -> list[Any]:
-        return list(self.whole.shaded(self.prepared.frame()))
+        super().__init__(whole, RayTraced(whole.camera, whole.scene.mesh, whole.rays.ray))
 
 
-class ByVertices:
+class ByVertices(Direct):
     """The scene's vertices where the mirror shows them, joined by straight edges."""
 
     def __init__(self, whole: "Reflection", triangles: int, level: int, cams: CameraTriangles | None):
         self.cams = decomposed(whole, triangles, 2) if cams is None else cams
-        self.whole = whole
-        self.prepared = VirtualVertices(whole.camera, whole.scene.mesh, self.cams, whole.rays.ray, level)
-
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
-
-    def colours(self) -> list[Any]:
-        return list(self.whole.shaded(self.prepared.frame()))
+        super().__init__(whole, VirtualVertices(whole.camera, whole.scene.mesh, self.cams, whole.rays.ray, level))
 
 
 def decomposed(whole: "Reflection", triangles: int, resolution: int) -> CameraTriangles:

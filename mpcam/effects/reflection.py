@@ -43,10 +43,10 @@ class Reflection:
     default the scene's. method: "camera_triangles"; "vertex", the images of the scene's vertices in camera triangles,
     joined by straight edges, each split 2**level times first; "environment", an environment map from the mirror's
     middle, two views of `size` (512) pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as
-    for `render`; rays that miss the scene see its environment, or its background. triangles, resolution: in place of
-    the mirror's. cams: camera triangles to take instead of decomposing the mirror. shadows: shadow maps of the scene's
-    lights (see `shadow_map`), in which the mirror itself throws none. Raises InputError for a scene without mirror or
-    camera, an eye that does not see it, and other values.
+    for `render`; rays that miss the scene see its environment, or its background. triangles, and for
+    "camera_triangles" resolution: in place of the mirror's. cams: camera triangles to take instead of decomposing the
+    mirror. shadows: shadow maps of the scene's lights (see `shadow_map`), in which the mirror itself throws none.
+    Raises InputError for a scene without mirror or camera, an eye that does not see it, and other values.
     """
 
     @exclusive
@@ -127,9 +127,9 @@ class Reflection:
 
     @property
     def hits(self) -> Hits:
-        """First hits of the camera triangles' rays. Raises InputError for other methods."""
+        """First hits of the camera triangles' rays. Raises InputError for methods without."""
         if not isinstance(self.part, ByTriangles):
-            raise InputError(f"method={self.method!r} has no camera triangles that hit anything")
+            raise InputError(f"hits are those of method='camera_triangles', and this picture has {self.method!r}")
         return self.part.prepared.frame()
 
     @property

@@ -42,7 +42,8 @@ class VirtualVertices(VertexProjected):
     @exclusive
     def _set_up(self, cams: CameraTriangles, rays: Ray) -> None:
         t, mesh = types(), self.mesh
-        self.view = lambda: self.device.view(*self.device.rays(rays))
+        view = self.device.view(*self.device.rays(rays))
+        self.view = lambda: view
         table = corner_rays(cams, self.device)
         self.rays = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel()) + opaque_zero()
         self.cones = _cones(table)
@@ -56,18 +57,18 @@ class VirtualVertices(VertexProjected):
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
+        from mpcam_kernels.backend import backend_name
         from mpcam_kernels.lanes import lanes
         from mpcam_kernels.rows import room
 
         t, total = types(), self.counts[0]
         every = lanes(t, 0, total)
-        candidates, balls, nearest, pixels = _kernels(
-            type(self.camera), self.camera.domain.image_radius is None, self.points
-        )
+        unbounded = self.camera.domain.image_radius is None
+        candidates, balls, nearest, pixels = _kernels(type(self.camera), unbounded, self.points, backend_name())
         points = balls(every, vertices, self.corners, self.parts.grid, self.order, room(t, 1, total))
         keys = dr.zeros(t.UInt64, total)
         dr.make_opaque(keys)
-        met = candidates.met(self.counts, self.cones, candidates.levels(points, self.counts), _untold)
+        met = candidates.met(self.counts, self.cones, candidates.levels(points, self.counts))
         for pairs, number in met:
             keys = nearest(lanes(t, 0, number), pairs, points, self.rays, keys)
         target = dr.empty(t.Float, 4 * total)
@@ -86,7 +87,9 @@ def with_directions(cams: CameraTriangles) -> CameraTriangles:
     _, valid = cams.bend(cams.vertices.T, cams.normals.T)
     kept = valid[cams.faces].all(axis=1)
     if not kept.any():
-        raise InputError("method='vertex': light is totally reflected at each camera triangle: there is nothing to see")
+        raise InputError(
+            "method='vertex': each camera triangle reflects all light: give another index, or move the camera"
+        )
     used = np.unique(cams.faces[kept])
     sides = np.broadcast_to(np.asarray(cams.resolution), kept.shape)[kept]
     part = dataclasses.replace(
@@ -126,12 +129,8 @@ def _cones(table: np.ndarray) -> Any:
     return Cones(target)
 
 
-def _untold(stage: str, arrays: Any) -> None:
-    """Stages of the search are not timed apart."""
-
-
 @functools.cache
-def _kernels(model: type[Camera], unbounded: bool, points: int) -> Any:
+def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) -> Any:
     """The search for camera triangles in which points may appear, and kernels before and after.
 
     balls: of radius 0 around the points of the tessellation, in the order of the search; radius -1 where a number is
@@ -153,14 +152,15 @@ def _kernels(model: type[Camera], unbounded: bool, points: int) -> Any:
         """The nearest image of points in camera triangles: where it lies, its distance, and whether there is one."""
         t = types()
         table = [dr.gather(t.Array3f, rays, face * 6 + k, active) for k in range(6)]
-        first, *others = three_rays.project(table[0::2], table[1::2], point)
-        w1, w2, c, valid = first
-        for other in others:
-            nearer = other.valid & (~valid | (other.c < c))
-            w1, w2, c = (dr.select(nearer, a, b) for a, b in zip(other[:3], (w1, w2, c), strict=True))
-            valid |= other.valid
-        place, way = (one * w1 + two * w2 + three * (1.0 - w1 - w2) for one, two, three in (table[0::2], table[1::2]))
-        return place, c * dr.norm(way), valid
+        best, distance, seen = t.Array3f(0), t.Float(dr.inf), t.Bool(False)
+        for w1, w2, c, valid in three_rays.project(table[0::2], table[1::2], point):
+            w3 = 1.0 - w1 - w2
+            place, way = (one * w1 + two * w2 + three * w3 for one, two, three in (table[0::2], table[1::2]))
+            away = c * dr.norm(way)  # rays differ in length, so c alone does not tell
+            nearer = valid & (away < distance)
+            best, distance = dr.select(nearer, place, best), dr.select(nearer, away, distance)
+            seen |= valid
+        return best, distance, seen
 
     @frozen
     def balls(number: Any, vertices: Any, faces: Any, grid: Any, order: Any, target: Rows) -> Rows:

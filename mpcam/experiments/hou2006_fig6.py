@@ -10,7 +10,9 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
 from mpcam.comparison.driver import moving_vertices
 from mpcam.comparison.metrics import flip_map, image_rmse, psnr
+from mpcam.comparison.mirrors import FINE
 from mpcam.comparison.pareto import pareto_front
+from mpcam.comparison.plan import LEVELS as HALVINGS
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.ray_error import ray_error
@@ -26,10 +28,6 @@ from mpcam.geometry.scene import Scene
 ROUNDS = 7
 SIZES = (64, 128, 256, 512, 1024)
 """Pixels along a side of each of the two views of an environment map."""
-HALVINGS = (0, 1, 2, 3, 4)
-"""Times that the edges are halved before vertices are projected."""
-FINE = 416
-"""Camera triangles that project them."""
 LEVELS = ((26, 128), (52, 90), (104, 64), (208, 45), (416, 32), (1664, 16))
 """Camera triangles and their resolution: about as many pixels in all."""
 

@@ -173,8 +173,8 @@ Method = Literal["invert", "vertex", "cubemap", "hemicube", "raytrace", "camera_
 class CompareTable(Table, frozen=True):
     """[compare]: what `mpcam compare` runs; a key that is left out is chosen there.
 
-    Scenes with a mirror are compared by camera_triangles, vertex, environment and raytrace, others by all but
-    the first and the third.
+    Scenes with a mirror are compared by camera_triangles, vertex, environment and raytrace, others by invert,
+    vertex, cubemap, hemicube and raytrace.
     """
 
     methods: Annotated[list[Method], Meta(min_length=1)] | None = None
