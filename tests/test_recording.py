@@ -71,8 +71,11 @@ from mpcam_kernels.frozen import frozen
 def scaled(x, once, twice, last):
     return x * last
 
-kernel, x = {wrapper}(scaled), types.UInt([1, 2, 3])
+kernel, x, y = {wrapper}(scaled), types.UInt([1, 2, 3]) + 0, types.UInt([3, 2, 1]) + 0
+dr.eval(x, y)
 print([kernel(x, 1, 2, last).numpy().tolist() for last in (2, 1)])
+kernel = {wrapper}(lambda a, b, last: 10 * last + 0 * (a + b))
+print([kernel(x, y, last).numpy().tolist() for last in (x, y)])
 """
 
 
@@ -81,13 +84,13 @@ def _numbers(wrapper: str) -> str:
     return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120).stdout
 
 
-def test_numbers_that_came_before_are_told_apart():
-    assert _numbers("frozen").strip() == "[[2, 4, 6], [1, 2, 3]]"
+def test_numbers_and_arrays_that_came_before_are_told_apart():
+    assert _numbers("frozen").split("\n")[:2] == ["[[2, 4, 6], [1, 2, 3]]", "[[10, 20, 30], [30, 20, 10]]"]
 
 
 def test_without_care_one_would_be_taken_for_the_other():
     """Once this fails, Dr.Jit has mended it, and `frozen` need not put the numbers into a text any more."""
-    assert _numbers("dr.freeze").strip() == "[[2, 4, 6], [2, 4, 6]]"
+    assert _numbers("dr.freeze").split("\n")[:2] == ["[[2, 4, 6], [2, 4, 6]]", "[[10, 20, 30], [10, 20, 30]]"]
 
 
 def test_many_cameras_and_meshes_in_one_process():
