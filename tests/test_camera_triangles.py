@@ -186,6 +186,17 @@ def test_chunks_give_the_same_frame(monkeypatch):
     bundled._pipeline.cache_clear()
 
 
+def test_more_pairs_than_can_be_numbered_are_refused(monkeypatch):
+    from mpcam.rendering import bundled
+
+    camera = patch()
+    mesh = around(camera, 150)
+    monkeypatch.setattr(bundled, "MOST_PAIRS", 150)
+    mp.prepare(camera, mesh)
+    with pytest.raises(mp.InputError, match="keep 'objects'"):
+        mp.prepare(camera, mesh, culling=("triangles",))
+
+
 def test_outputs_agree():
     camera = patch()
     mesh = around(camera, 150)

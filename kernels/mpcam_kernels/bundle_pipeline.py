@@ -158,11 +158,11 @@ class PlanePipeline(BundlePipeline):
         """Lists of items by block, for some at a time, and the items' rows."""
         types, found_planes, bundle = self.types, task.bundle.planes, task.bundle
         fan, cull = found_planes.fan, "triangles" in self.candidates.culling
-        most = LANES // fan * fan
+        most, step = LANES // fan * fan, min(ROOM, (1 << 32) // fan)  # lanes are numbered with 32 bits
         for found, number in self.candidates.met(task.counts, found_planes.cones, levels, tell):
             # Regions are large, so few at a time.
-            for start in range(0, number, ROOM):
-                lane = lanes(types, start, min(number, start + ROOM))
+            for start in range(0, number, step):
+                lane = lanes(types, start, min(number, start + step))
                 rows, some = self._items(lane, found_planes, task.vertices, task.faces, found, cull)
                 chosen = dr.compress(some)
                 tell("bounds", chosen)

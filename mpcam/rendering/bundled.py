@@ -20,6 +20,7 @@ from mpcam.rendering.maps import CoverageMap, DepthMap
 
 BOUNDS = ("tight", "triangle", "nine_point")
 CULLING = ("objects", "triangles")
+MOST_PAIRS = 1 << 32
 FEW = 256  # balls that are held against every group of blocks: more of them get clusters
 
 
@@ -63,6 +64,12 @@ class Bundled:
         """Another camera, for frames in which the eye or the mirror moves."""
         self.camera = camera
         self.rays = DeviceRays(camera, self.device, self.bound != "tight")
+        bundles = len(self.rays.layout.first)
+        if "objects" not in self.culling and bundles * self.mesh.triangle_count >= MOST_PAIRS:
+            raise InputError(
+                f"culling={self.culling!r} would look at {bundles:,} bundles of rays x {self.mesh.triangle_count:,} "
+                f"triangles: at most {MOST_PAIRS:,} pairs are possible, so keep 'objects', or give fewer triangles"
+            )
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
