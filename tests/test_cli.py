@@ -1,6 +1,5 @@
 """The command line: what it prints, what it returns, and that mistakes cost one line and status 2."""
 
-import functools
 import json
 import os
 import signal
@@ -19,10 +18,7 @@ COMMANDS = ("compare", "render", "project", "experiment", "doctor")
 
 def start(*arguments: str, **options) -> subprocess.Popen:
     command = [sys.executable, "-m", "mpcam", *arguments]
-    # What runs in a shell's background ignores interrupts, and so would its children.
-    heed = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command, text=True, preexec_fn=heed, **pipes, **options)
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
 def test_help_names_every_command(capsys):
