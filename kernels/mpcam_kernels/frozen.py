@@ -21,7 +21,7 @@ def frozen(function: Callable[..., Any]) -> Callable[..., Any]:
     ("enqueue_host_func(): this function cannot be recorded").
     """
 
-    def run(constants: str, *arguments: Any) -> Any:
+    def run(key: str, *arguments: Any) -> Any:
         return function(*arguments)
 
     replay = dr.freeze(run, limit=RECORDINGS, warn_after=1 << 30)

@@ -16,6 +16,7 @@ from mpcam.rendering.device import device_mesh, opaque_numbers, types
 from mpcam.rendering.device_rays import DeviceRays
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.layout import layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
 
 BOUNDS = ("tight", "triangle", "nine_point")
@@ -62,14 +63,14 @@ class Bundled:
     @exclusive
     def aim(self, camera: CameraTriangles) -> None:
         """Another camera, for frames in which the eye or the mirror moves."""
-        self.camera = camera
-        self.rays = DeviceRays(camera, self.device, self.bound != "tight")
-        bundles = len(self.rays.layout.first)
+        tight = self.bound == "tight"
+        bundles = len(layout(camera.atlas).first) if tight else camera.count
         if "objects" not in self.culling and bundles * self.mesh.triangle_count >= MOST_PAIRS:
             raise InputError(
                 f"culling={self.culling!r} would look at {bundles:,} bundles of rays x {self.mesh.triangle_count:,} "
                 f"triangles: at most {MOST_PAIRS:,} pairs are possible, so keep 'objects', or give fewer triangles"
             )
+        self.camera, self.rays = camera, DeviceRays(camera, self.device, not tight)
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
