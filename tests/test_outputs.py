@@ -56,7 +56,7 @@ def test_culled_sides(name):
     far_side = mp.rasterize(camera, ahead, cull="front")
     np.testing.assert_array_equal(far_side.mask, whole.mask)
     assert (far_side.depth[whole.mask] > whole.depth[whole.mask]).all()
-    if camera.central:
+    if camera.ray_geometry == "central":
         assert not mp.rasterize(camera, sphere, cull="back").mask.any()
 
 

@@ -1,7 +1,7 @@
 """What every camera model shares: the public edge (arrays of points and pixels, world frame) around its own maps.
 
-A model is a final frozen dataclass that supplies three maps in its own frame, components first, for NumPy, JAX and
-Dr.Jit arrays alike: `local_ray`, `local_project` and `local_bound`.
+A model is a frozen dataclass that supplies maps in its own frame, components first, for NumPy, JAX and Dr.Jit arrays
+alike: `local_ray`, which is all that a camera needs, and what it knows beyond (see `capabilities`).
 """
 
 import dataclasses
@@ -10,8 +10,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from mpcam.cameras.capabilities import Bounds, HasRays, Projects, need
 from mpcam.cameras.pose import as_pose, frame_origin
-from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
 
@@ -66,26 +67,20 @@ class Camera:
     height: int
     camera_from_world: Any
 
-    central: ClassVar[bool] = True
-    """Whether all rays leave from the origin of the camera frame."""
-    parallel: ClassVar[bool] = False
-    """Whether all rays run along +z of the camera frame."""
+    ray_geometry: ClassVar[RayGeometry] = "general"
+    """ "central": all rays leave from the camera frame's origin; "parallel": all run along its +z; else "general"."""
     images_per_point: ClassVar[int] = 1
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height")
     """Fields that are part of the program rather than of the data (JAX, frozen kernels)."""
 
-    def local_ray(self, pixel: Vector) -> Ray:
-        raise TypeError(f"{type(self).__name__} must define local_ray")
-
-    def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        raise TypeError(f"{type(self).__name__} must define local_project")
-
-    def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
-        raise TypeError(f"{type(self).__name__} must define local_bound")
-
     @property
     def domain(self) -> Domain:
-        raise TypeError(f"{type(self).__name__} must define domain")
+        """Where the camera is defined; unless a model says otherwise, nothing is known of it."""
+        return Domain(None, None)
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
+        _waiting.append(cls)
 
     def ray(self, pixel: Array) -> Ray:
         """Rays of pixels, in the world frame.
@@ -94,8 +89,9 @@ class Camera:
         Dr.Jit: an Array2f in, Array3f out. Raises InputError when the last axis is not 2.
         """
         register_pytrees()
+        local_ray = need(self, HasRays, "ray()").local_ray
         with _quiet():
-            origin, direction, valid = self.local_ray(components(pixel, 2, "pixel"))
+            origin, direction, valid = local_ray(components(pixel, 2, "pixel"))
         pose, shift = self.camera_from_world, translation(self.camera_from_world)
         moved = vector(origin[0] - shift[0], origin[1] - shift[1], origin[2] - shift[2])
         return Ray(_last(rotate_back(pose, moved)), _last(rotate_back(pose, direction)), valid)
@@ -107,8 +103,9 @@ class Camera:
         Dr.Jit: an Array3f in, tuples of k entries out. Raises InputError when the last axis is not 3.
         """
         register_pytrees()
+        local_project = need(self, Projects, "project()").local_project
         with _quiet():
-            images = self.local_project(self.local(components(points, 3, "points")))
+            images = local_project(self.local(components(points, 3, "points")))
         kind = library(*images[0])
         if kind == "drjit":
             return Projection(*(tuple(image[i] for image in images) for i in range(3)))
@@ -130,8 +127,9 @@ class Camera:
         corners = components(triangle, 3, "triangle")
         if corners.ndim < 2 or corners.shape[-1] != 3:
             raise InputError(f"triangle has shape {np.shape(triangle)}: (..., 3, 3) is needed, corners by rows")
+        local_bound = need(self, Bounds, "bound()").local_bound
         with _quiet():
-            box = self.local_bound(*(self.local(corners[..., i]) for i in range(3)))
+            box = local_bound(*(self.local(corners[..., i]) for i in range(3)))
         return Box(_last(box.low), _last(box.high), box.valid)
 
     def local(self, point: Vector) -> Vector:
@@ -172,6 +170,9 @@ class Camera:
 
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
+    def __post_init__(self) -> None:
+        self._check_frame()
+
     def _check_frame(self) -> None:
         """Check and normalize width, height and pose at construction."""
         for name in ("width", "height"):
@@ -198,19 +199,17 @@ class Camera:
         object.__setattr__(self, name, number)
 
 
-_registered: set[type] = set()
+_waiting: list[type[Camera]] = []  # models that JAX does not know yet
 
 
 def register_pytrees() -> None:
-    """Make every camera model a JAX pytree; does nothing while JAX is not loaded, and each model once."""
-    if "jax" not in sys.modules or len(_registered) == len(Camera.__subclasses__()):
-        return
-    tree_util = getattr(sys.modules["jax"], "tree_util", None)  # absent while JAX is still being imported
+    """Make every camera model a JAX pytree, users' own too, each once; does nothing while JAX is not loaded."""
+    tree_util = getattr(sys.modules.get("jax"), "tree_util", None)  # absent while JAX is still being imported
     if tree_util is None:
         return
-    for model in Camera.__subclasses__():
-        if model not in _registered:
-            _registered.add(model)
+    while _waiting:
+        model = _waiting.pop()
+        if dataclasses.is_dataclass(model):
             _register(model, tree_util)
 
 

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_rough
-from mpcam.cameras.outline import Lens, Outline, small_outline, symmetric_lens
+from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import Profile, bulges_outward
 from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
-from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, detach, epsilon, library, maximum, minimum, vector, where
 
@@ -61,6 +61,7 @@ class Calibrated:
     edge: Any
     convex: bool
 
+    ray_geometry: ClassVar[RayGeometry] = "central"
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "convex")
     shape_fields: ClassVar[tuple[str, ...]]
     """Fields that decide f."""
@@ -159,16 +160,16 @@ class Calibrated:
         """
         return self._bound(radial_bound, a, b, c)
 
-    def local_lens(self, point: Vector) -> Lens:
+    def local_vertex_view(self, point: Vector) -> VertexView:
         """What a vertex knows of the projection around it, for `local_outline`."""
         limit = self.angle_limit()
         convex = self.limit is not None and self.convex
         view = limit if self.limit is None else self.edge
-        return symmetric_lens(self._profile(limit, convex), view, limit, point)
+        return symmetric_vertex_view(self._profile(limit, convex), view, limit, point)
 
-    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+    def local_outline(self, points: list[Vector], views: list[VertexView]) -> tuple[Outline, Array]:
         """Box and three lines around a small triangle, and whether they hold."""
-        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, lenses)
+        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, views)
 
     def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
         """A cheap conservative box, for triangles of which `local_outline` is not sure."""

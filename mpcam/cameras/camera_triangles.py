@@ -45,7 +45,6 @@ class CameraTriangles(Camera):
     index: Any = None
     camera_from_world: Any = None
 
-    central: ClassVar[bool] = False
     static_fields: ClassVar[tuple[str, ...]] = ("faces", "resolution", "ray_scale")
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from mpcam.errors import InputError
 from mpcam.math import PI, Array, detach, invert_increasing, library, minimum, polynomial, sign_changes
 
 _NODES = 4096
-_LARGEST = 1e6  # of a coefficient; lenses have less than 1
+_LARGEST = 1e6  # of a coefficient; views have less than 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

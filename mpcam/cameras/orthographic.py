@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any, ClassVar
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.math import Array, Vector, isfinite, maximum, minimum, vector, where
 
 
@@ -24,8 +24,7 @@ class Orthographic(Camera):
     cy: Any = None
     camera_from_world: Any = None
 
-    central: ClassVar[bool] = False
-    parallel: ClassVar[bool] = True
+    ray_geometry: ClassVar[RayGeometry] = "parallel"
 
     def __post_init__(self) -> None:
         self._check_frame()

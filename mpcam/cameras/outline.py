@@ -34,7 +34,7 @@ NEAR, UNSURE, HIDDEN = 0.0, 1.0, 2.0
 _SHARP = 2e-3  # pixels; chord triangles less high than this have no sure orientation in float32
 
 
-class Lens(NamedTuple):
+class VertexView(NamedTuple):
     """What a vertex knows of the projection around it: s, p and q (see above), and where it is."""
 
     s: Array
@@ -46,8 +46,8 @@ class Lens(NamedTuple):
 class Outlined(Protocol):
     """A camera that outlines triangles from their corners."""
 
-    def local_lens(self, point: Vector) -> "Lens": ...
-    def local_outline(self, points: list[Vector], lenses: list["Lens"]) -> tuple["Outline", Array]: ...
+    def local_vertex_view(self, point: Vector) -> "VertexView": ...
+    def local_outline(self, points: list[Vector], views: list["VertexView"]) -> tuple["Outline", Array]: ...
     def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box: ...
 
 
@@ -63,7 +63,7 @@ class Outline(NamedTuple):
     lines: tuple[Vector, Vector, Vector]
 
 
-def symmetric_lens(profile: Profile, view: Array, end: Array, point: Vector) -> Lens:
+def symmetric_vertex_view(profile: Profile, view: Array, end: Array, point: Vector) -> VertexView:
     """The lens of a point in the camera frame (any length).
 
     view: angle from the axis that the image reaches to, radians; end: from where on no point has an image.
@@ -86,23 +86,23 @@ def symmetric_lens(profile: Profile, view: Array, end: Array, point: Vector) -> 
     # What a view does not see is a cone around the point behind the eye, convex from 180 degrees of view on.
     hidden = theta > maximum(end, 0.5 * PI) + 1e-5
     place = where(hidden, HIDDEN, where(near, NEAR if profile.convex else UNSURE, UNSURE))
-    return Lens(s, p, q, place)
+    return VertexView(s, p, q, place)
 
 
 def small_outline(
-    centre: tuple[Array, Array], focal: tuple[Array, Array], points: list[Vector], lenses: list[Lens]
+    centre: tuple[Array, Array], focal: tuple[Array, Array], points: list[Vector], views: list[VertexView]
 ) -> tuple[Outline, Array]:
     """Outline of a triangle from its corners (camera frame), and whether it holds; else look for a rougher one.
 
     An outline that holds is not valid where the triangle is hidden, or has corners that are not finite.
     """
     finite = isfinite(sum(point[i] for point in points for i in range(3)))
-    places = [lens.place for lens in lenses]
+    places = [lens.place for lens in views]
     hidden = minimum(minimum(places[0], places[1]), places[2]) >= HIDDEN
     sure = maximum(maximum(places[0], places[1]), places[2]) <= NEAR
     images = [
         vector(centre[0] + focal[0] * (lens.s * point[0]), centre[1] + focal[1] * (lens.s * point[1]))
-        for point, lens in zip(points, lenses, strict=True)
+        for point, lens in zip(points, views, strict=True)
     ]
     low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
     high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
@@ -112,7 +112,7 @@ def small_outline(
         after = (k + 1) % 3
         a, b, m0, m1 = points[k], points[after], images[k], images[after]
         step = vector(*(b[i] - a[i] for i in range(3)))
-        g0, g1 = _velocity(focal, a, lenses[k], step), _velocity(focal, b, lenses[after], step)
+        g0, g1 = _velocity(focal, a, views[k], step), _velocity(focal, b, views[after], step)
         agreement = g0[0] * g1[0] + g0[1] * g1[1]
         speeds = (g0[0] * g0[0] + g0[1] * g0[1]) * (g1[0] * g1[0] + g1[1] * g1[1])
         sure = sure & ((speeds == 0) | ((agreement > 0) & (agreement * agreement > 0.75 * speeds)))
@@ -149,7 +149,7 @@ def small_outline(
 def outline(camera: "Outlined", a: Vector, b: Vector, c: Vector) -> Outline:
     """Outline of a triangle by its corners (camera frame): that of `local_outline`, or the rough box."""
     points = [a, b, c]
-    quick, sure = camera.local_outline(points, [camera.local_lens(point) for point in points])
+    quick, sure = camera.local_outline(points, [camera.local_vertex_view(point) for point in points])
     rough = without_lines(camera.local_bound_rough(a, b, c))
 
     def chosen(first: Vector, second: Vector) -> Vector:
@@ -171,7 +171,7 @@ def without_lines(box: Box) -> Outline:
     return Outline(box.low, box.high, box.valid, (everywhere, everywhere, everywhere))
 
 
-def _velocity(focal: tuple[Array, Array], point: Vector, lens: Lens, step: Vector) -> Vector:
+def _velocity(focal: tuple[Array, Array], point: Vector, lens: VertexView, step: Vector) -> Vector:
     """Image velocity of a point that moves along `step`."""
     pull = lens.p * (point[0] * step[0] + point[1] * step[1]) - lens.q * step[2]
     return vector(focal[0] * (lens.s * step[0] + pull * point[0]), focal[1] * (lens.s * step[1] + pull * point[1]))

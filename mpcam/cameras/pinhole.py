@@ -1,11 +1,11 @@
 """The pinhole camera: straight lines stay straight."""
 
 import dataclasses
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.outline import HIDDEN, NEAR, UNSURE, Lens, Outline, small_outline
-from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.cameras.outline import HIDDEN, NEAR, UNSURE, Outline, VertexView, small_outline
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, epsilon, isfinite, maximum, minimum, norm, normalize, tan, vector, where
 
@@ -29,6 +29,8 @@ class Pinhole(Camera):
     cx: Any = None
     cy: Any = None
     camera_from_world: Any = None
+
+    ray_geometry: ClassVar[RayGeometry] = "central"
 
     def __post_init__(self) -> None:
         self._check_frame()
@@ -103,17 +105,17 @@ class Pinhole(Camera):
         valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
         return Box(vector(*low), vector(*high), valid)
 
-    def local_lens(self, point: Vector) -> Lens:
+    def local_vertex_view(self, point: Vector) -> VertexView:
         """What a vertex knows of the projection around it, for `local_outline`."""
         z, size = point[2], norm(point)
         near = z > 1e-3 * size  # farther out, rounding in the image is no longer small against pixels
         inverse = 1.0 / where(near, z, 1.0)
         place = where(near, NEAR, where(z > -1e-6 * size, UNSURE, HIDDEN))
-        return Lens(inverse, 0.0 * z, inverse * inverse, where(size > 0, place, UNSURE))
+        return VertexView(inverse, 0.0 * z, inverse * inverse, where(size > 0, place, UNSURE))
 
-    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+    def local_outline(self, points: list[Vector], views: list[VertexView]) -> tuple[Outline, Array]:
         """Box and three lines around a small triangle, and whether they hold."""
-        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, lenses)
+        return small_outline((self.cx, self.cy), (self.fx, self.fy), points, views)
 
     def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
         """The box for triangles of which `local_outline` is not sure."""

@@ -7,11 +7,11 @@ from typing import Any, ClassVar, Self
 from mpcam.cameras.arcs import radial_bound, radial_bound_rough
 from mpcam.cameras.base import Camera
 from mpcam.cameras.chords import radial_bound_triangles
-from mpcam.cameras.outline import Lens, Outline, small_outline, symmetric_lens
+from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
 from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
-from mpcam.cameras.types import Box, Domain, Projection, Ray
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, epsilon, library, vector
 
@@ -39,6 +39,7 @@ class Radial(Camera):
     cx: Any = None
     cy: Any = None
 
+    ray_geometry: ClassVar[RayGeometry] = "central"
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "profile")
 
     def __post_init__(self) -> None:
@@ -146,14 +147,14 @@ class Radial(Camera):
         """The paper's bounding triangles: four pieces, each valid or not, whose union holds the curved triangle."""
         return radial_bound_triangles(self, a, b, c)
 
-    def local_lens(self, point: Vector) -> Lens:
+    def local_vertex_view(self, point: Vector) -> VertexView:
         """What a vertex knows of the projection around it, for `local_outline`."""
-        return symmetric_lens(self.profile, 0.5 * self.fov, 0.5 * self.fov, point)
+        return symmetric_vertex_view(self.profile, 0.5 * self.fov, 0.5 * self.fov, point)
 
-    def local_outline(self, points: list[Vector], lenses: list[Lens]) -> tuple[Outline, Array]:
+    def local_outline(self, points: list[Vector], views: list[VertexView]) -> tuple[Outline, Array]:
         """Box and three lines around a small triangle, and whether they hold."""
         scale = self.pixels_per_radius
-        return small_outline((self.cx, self.cy), (scale, scale), points, lenses)
+        return small_outline((self.cx, self.cy), (scale, scale), points, views)
 
     def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
         """A cheap conservative box, for triangles of which `local_outline` is not sure."""

@@ -1,8 +1,10 @@
 """What cameras give back: rays, projections and pixel boxes, with fixed shapes and a mask instead of NaN."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from mpcam.math import Array
+
+RayGeometry = Literal["central", "parallel", "general"]
 
 
 class Ray(NamedTuple):

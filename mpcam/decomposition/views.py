@@ -34,7 +34,7 @@ class View:
 def eye_point(eye: Any) -> np.ndarray:
     """The point (3,) that rays leave from: the eye itself, or a camera's centre. Raises InputError for others."""
     if isinstance(eye, Camera):
-        if not eye.central:
+        if eye.ray_geometry != "central":
             raise InputError(
                 f"the eye is a {type(eye).__name__}, whose rays have no common centre: give a point (3,), or a camera "
                 "with one"

@@ -125,7 +125,7 @@ class Caustics:
     @exclusive
     def aim(self, camera: Camera) -> None:
         """Another eye. Raises InputError for a camera without a common centre."""
-        if not isinstance(camera, Camera) or not camera.central:
+        if not isinstance(camera, Camera) or camera.ray_geometry != "central":
             raise InputError(
                 f"caustics: camera is a {type(camera).__name__}: give one of mpcam's cameras with a common centre"
             )

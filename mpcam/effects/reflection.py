@@ -72,7 +72,7 @@ class Reflection:
             raise InputError(f"scene {scene.name!r} has no mirror: give it one, mpcam.Mirror(surface), or pass mirror=")
         if not isinstance(found, Mirror):
             raise InputError(f"mirror is a {type(found).__name__}: give mpcam.Mirror(surface)")
-        if not isinstance(given, Camera) or not given.central:
+        if not isinstance(given, Camera) or given.ray_geometry != "central":
             raise InputError("a camera with a common centre is needed to look into a mirror: give one as camera=")
         check_shading(shading)
         check_shadows(shadows, scene, shading)

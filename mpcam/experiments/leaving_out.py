@@ -104,10 +104,10 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
         return [Outline(*without_lines(outline)) for outline in outlines.tight(camera, rows)]  # pyright: ignore[reportArgumentType]
 
     def from_positions(camera: Any, rows: list[list[Any]]) -> list[Outline]:
-        lenses = [camera.local_lens(row[0].xyz) for row in rows]
+        views = [camera.local_vertex_view(row[0].xyz) for row in rows]
         four = type(rows[0][0])
-        places = [four(*row[0].xyz, lens.place) for row, lens in zip(rows, lenses, strict=True)]
-        more = [four(lens.s, lens.p, lens.q, 0) for lens in lenses]
+        places = [four(*row[0].xyz, lens.place) for row, lens in zip(rows, views, strict=True)]
+        more = [four(lens.s, lens.p, lens.q, 0) for lens in views]
         return outlines.tight(camera, [list(pair) for pair in zip(places, more, strict=True)])
 
     central = kernel_test("central")
@@ -116,7 +116,7 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
     kernels = Pipeline(
         types(),
         boxes if without == "lines of the outlines" else from_positions if per_triangle else outlines.tight,
-        outlines.hidden_never if per_triangle or without.startswith("hidden") else outlines.hidden_by_lens,
+        outlines.hidden_never if per_triangle or without.startswith("hidden") else outlines.hidden_by_view,
         all_blocks if edges else central,
         (scene.camera.width, scene.camera.height),
         output={"triangle numbers (depth alone)": "depth", "depths too (coverage alone)": "coverage"}.get(

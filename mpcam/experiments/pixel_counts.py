@@ -45,7 +45,7 @@ def regions(camera: Any, corners: Reals, bound: str) -> list[Region]:
             return [_region(camera, camera.local_bound_quads(*points))]
         if bound == "triangle":
             return [_region(camera, piece, piece.lines) for piece in camera.local_bound_triangles(*points)]
-        outline, sure = camera.local_outline(points, [camera.local_lens(point) for point in points])
+        outline, sure = camera.local_outline(points, [camera.local_vertex_view(point) for point in points])
         rough = _region(camera, camera.local_bound_rough(*points))
         fine = _region(camera, outline, outline.lines)
         everywhere = np.array([0.0, 0.0, 1.0])

@@ -62,7 +62,7 @@ class Cubemapped:
         ):
             raise InputError(f"resolution={resolution!r}: a whole number of pixels from 1 to 16384 is needed")
         angle = camera.domain.max_angle
-        if not camera.central or angle is None:
+        if camera.ray_geometry != "central" or angle is None:
             raise InputError(f"method={self.method!r} needs a camera with one centre, not {type(camera).__name__}")
         if self.half and angle > 0.5 * PI + 1e-9:
             raise InputError(

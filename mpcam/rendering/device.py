@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import HasRays, need
 from mpcam.cameras.profiles import Profile
 from mpcam.cameras.types import Ray
 from mpcam.errors import InputError, SetupError
@@ -181,9 +182,11 @@ class Lens:
         from mpcam_kernels import samples
 
         _check_profile(getattr(camera, "profile", None))
-        alike = camera.central or camera.parallel  # others keep their tables, which kernels read in a form of their own
+        alike = camera.ray_geometry != "general"  # others keep their tables, which kernels read in a form of their own
         self.on_device, self.size = device_lens(camera) if alike else camera, (camera.width, camera.height)
-        self.ray = self.on_device.local_ray(samples.pixel_centres(types(), camera.width, camera.height))
+        self.ray = need(self.on_device, HasRays, "a frame").local_ray(
+            samples.pixel_centres(types(), camera.width, camera.height)
+        )
         dr.eval(self.ray)
 
     @functools.cached_property

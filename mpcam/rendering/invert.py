@@ -36,7 +36,7 @@ class Inverted(Buffered):
             raise InputError(
                 f"bound={bound!r} is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
             )
-        super().__init__(camera, mesh, "central" if camera.central else "planar")
+        super().__init__(camera, mesh, "central" if camera.ray_geometry == "central" else "planar")
         self.bound, self.output, self.cull = bound, output, cull
 
     def place(self, vertices: Any) -> list[Any]:
@@ -74,8 +74,8 @@ def _frozen_place(curved: bool, model: type, static: tuple[Any, ...], rows: int)
         elif rows == 1:
             values = [four(*point, 0)]
         else:
-            lens = camera.local_lens(point)
-            values = [four(*point, lens.place), four(lens.s, lens.p, lens.q, 0)]
+            view = camera.local_vertex_view(point)
+            values = [four(*point, view.place), four(view.s, view.p, view.q, 0)]
         for target, value in zip(targets, values, strict=True):
             dr.scatter(target, value, number)
         return targets

@@ -49,7 +49,7 @@ def prepare(
         )
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
-    alike = camera.central or camera.parallel
+    alike = camera.ray_geometry != "general"
     invert = ("bound", "cull") if alike else ("bound", "cull", "culling")
     kinds = {"invert": invert, "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
@@ -71,7 +71,7 @@ def prepare(
 
 def _kind(method: str, camera: Camera) -> Any:
     """The class of a method for a camera; each is imported only when it is asked for."""
-    if method == "invert" and not (camera.central or camera.parallel):
+    if method == "invert" and camera.ray_geometry == "general":
         from mpcam.rendering.bundled import Bundled
 
         return Bundled

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mpcam.cameras.chords import chord_pieces
-from mpcam.cameras.outline import HIDDEN, Lens, without_lines
+from mpcam.cameras.outline import HIDDEN, VertexView, without_lines
 from mpcam_kernels.regions import Outline
 
 ROWS = {"tight": 2, "quad": 1, "triangle": 1, "straight": 1}
@@ -17,8 +17,8 @@ PIECES = {"triangle": 4}
 def tight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     """By the tangents at the corners; the camera's rough box where these are not enough."""
     points = [row[0].xyz for row in rows]
-    lenses = [Lens(row[1].x, row[1].y, row[1].z, row[0].w) for row in rows]
-    quick, sure = camera.local_outline(points, lenses)
+    views = [VertexView(row[1].x, row[1].y, row[1].z, row[0].w) for row in rows]
+    quick, sure = camera.local_outline(points, views)
     return [_or_box(points, quick, sure, camera.local_bound_rough)]
 
 
@@ -58,7 +58,7 @@ def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     return [Outline(low.xy, high.xy, finite, (lines[0], lines[1], lines[2]))]
 
 
-def hidden_by_lens(first: list[Any]) -> Any:
+def hidden_by_view(first: list[Any]) -> Any:
     """Whether all corners lie in the convex region that no pixel sees."""
     import drjit as dr
 
@@ -70,7 +70,7 @@ def hidden_never(first: list[Any]) -> Any:
     return first[0].w != first[0].w
 
 
-HIDDEN_TESTS = {"tight": hidden_by_lens}
+HIDDEN_TESTS = {"tight": hidden_by_view}
 OUTLINES = {"tight": tight, "quad": quad, "triangle": triangle, "straight": straight}
 
 

@@ -37,7 +37,7 @@ class VertexProjected(Buffered):
             raise InputError(
                 f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}"
             )
-        super().__init__(camera, mesh, "projected" if camera.central else "planar")
+        super().__init__(camera, mesh, "projected" if camera.ray_geometry == "central" else "planar")
         self.level = int(level)
         self.parts = Parts(2**self.level)
         self.corners = self.faces  # of the whole triangles
@@ -73,7 +73,7 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
 
     from mpcam_kernels.frozen import frozen
 
-    central = model.central
+    central = model.ray_geometry == "central"
 
     @frozen
     def place(
