@@ -9,7 +9,7 @@ from triangle_cameras import CAMERAS, FACES, QUAD, around, centres, mixed, patch
 
 import mpcam as mp
 from mpcam.math.optics import reflect, refract
-from mpcam.rendering.bundled import Bundled
+from mpcam.rendering.general import GeneralRasterizer
 
 
 def test_every_triangle_has_its_pixels_and_no_two_touch():
@@ -169,29 +169,30 @@ def test_many_triangles_by_levels_of_clusters():
 
 
 def test_chunks_give_the_same_frame(monkeypatch):
-    from mpcam.rendering import bundled
-    from mpcam_kernels import bundle_pipeline, candidates
+    from mpcam.rendering import general
+    from mpcam_kernels import block_pipeline, candidates, plane_pipeline
 
     camera = patch(3, 31)
-
     mesh = around(camera, 400, 0.7)
     whole = mp.rasterize(camera, mesh)
-    bundled._pipeline.cache_clear()
-    monkeypatch.setattr(bundle_pipeline, "ROOM", 2000)
-    monkeypatch.setattr(bundle_pipeline, "MANY", 100)
-    for module in (bundle_pipeline, candidates):
-        monkeypatch.setattr(module, "LANES", 5000)
+    general._pipeline.cache_clear()
+    for name, value in (("ROOM", 2000), ("SPLIT", 300), ("PIXELS_PER_TRIANGLE", 1 << 20)):
+        monkeypatch.setattr(block_pipeline, name, value)
+    monkeypatch.setattr(plane_pipeline, "ROOM", 2000)
+    for module in (plane_pipeline, candidates):
+        monkeypatch.setattr(module, "THREADS", 5000)
+    monkeypatch.setattr(candidates, "FEW", 100)
     for bound in ("tight", "nine_point"):
         assert np.array_equal(mp.rasterize(camera, mesh, bound=bound).triangle, whole.triangle)
-    bundled._pipeline.cache_clear()
+    general._pipeline.cache_clear()
 
 
 def test_more_pairs_than_can_be_numbered_are_refused(monkeypatch):
-    from mpcam.rendering import bundled
+    from mpcam.rendering import general
 
     camera = patch()
     mesh = around(camera, 150)
-    monkeypatch.setattr(bundled, "MOST_PAIRS", 150)
+    monkeypatch.setattr(general, "MOST_PAIRS", 150)
     mp.prepare(camera, mesh)
     with pytest.raises(mp.InputError, match="keep 'objects'"):
         mp.prepare(camera, mesh, culling=("triangles",))
@@ -209,7 +210,7 @@ def test_moving_scenes_and_eyes_need_no_preparation():
     camera = patch()
     mesh = around(camera, 150)
     prepared = mp.prepare(camera, mesh)
-    assert isinstance(prepared, Bundled)
+    assert isinstance(prepared, GeneralRasterizer)
     prepared.frame()
     moved = mesh.vertices + [0.3, -0.1, 0.2]
     prepared.update(moved)
@@ -305,7 +306,7 @@ def test_mistakes_in_faces_and_settings():
             mp.CameraTriangles(QUAD, faces, directions=np.ones((4, 3)))
     camera = CAMERAS["direct"]()
     mesh = around(camera, 3)
-    for settings in ({"bound": "quad"}, {"cull": "back"}, {"culling": "objects"}, {"culling": ("all",)}):
+    for settings in ({"bound": "quad"}, {"cull": "left"}, {"culling": "objects"}, {"culling": ("all",)}):
         with pytest.raises(mp.InputError):
             mp.rasterize(camera, mesh, **settings)
 

@@ -63,15 +63,15 @@ def test_parallel_rays_have_no_waist():
 
 
 def test_a_lost_pixel_would_be_found(monkeypatch):
-    from mpcam.rendering import bundled
+    from mpcam.rendering import general
     from mpcam.stress import camera_triangle_bounds as bounds
-    from mpcam_kernels import hierarchy
+    from mpcam_kernels.ray_cones import Cone
 
-    narrow = hierarchy.may_meet
-    bundled._pipeline.cache_clear()
-    monkeypatch.setattr(hierarchy, "may_meet", lambda cone, ball: narrow(cone, type(ball)(*ball.xyz, 0.5 * ball.w)))
+    narrow = Cone.may_meet
+    general._pipeline.cache_clear()
+    monkeypatch.setattr(Cone, "may_meet", lambda cone, ball: narrow(cone, type(ball)(*ball.xyz, 0.5 * ball.w)))
     found = {case.case: case.missed for case in bounds.bound_cases("positive", 1)}
-    bundled._pipeline.cache_clear()
+    general._pipeline.cache_clear()
     assert found["tight, positive"] > 10
 
 

@@ -14,7 +14,7 @@ from mpcam_kernels import regions
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import COARSE, HEIGHT, PART, PARTS, WIDTH, Samples
 
-LANES_WANTED = 1 << 14  # the rows of a triangle's squares are shared among lanes until there are about so many
+THREADS_WANTED = 1 << 14  # the rows of a triangle's squares are shared among threads until there are about so many
 LEAST_SHARE = 4
 LINK = 1 << PARTS
 MOST = (1 << 32) // LINK - 1  # entries that can be numbered
@@ -101,18 +101,18 @@ def _unpacked(types: Any, test: Any, large: Large, item: Any) -> tuple[regions.R
 
 
 def share(items: int, columns: int, rows: int, most: int) -> int:
-    """Lanes for the rows of one triangle's squares, a power of two; one lane finds at most `most` of them."""
-    lanes = LEAST_SHARE
-    while lanes < rows and (lanes * items < LANES_WANTED or -(-rows // lanes) * columns > most):
-        lanes *= 2
-    return lanes
+    """Threads for the rows of one triangle's squares, a power of two; one thread finds at most `most` of them."""
+    threads = LEAST_SHARE
+    while threads < rows and (threads * items < THREADS_WANTED or -(-rows // threads) * columns > most):
+        threads *= 2
+    return threads
 
 
 def find_squares(
-    types: Any, test: Any, lanes: Any, per_item: int, samples: Samples, large: Large, columns: int, most: int
+    types: Any, test: Any, threads: Any, per_item: int, samples: Samples, large: Large, columns: int, most: int
 ) -> Squares:
     """Coarse squares that may have a hit of an item. Those beyond `most` are counted, but not kept."""
-    item, first = lanes // per_item, types.Int(lanes % per_item)
+    item, first = threads // per_item, types.Int(threads % per_item)
     area, _, shape = _unpacked(types, test, large, item)
     bottom = (area.y1 + (COARSE - 1)) // COARSE
     found = dr.zeros(types.UInt, 1)
@@ -145,7 +145,7 @@ def find_squares(
 def list_blocks(
     types: Any,
     test: Any,
-    lanes: Any,
+    threads: Any,
     samples: Samples,
     large: Large,
     grid: tuple[int, int],
@@ -153,12 +153,12 @@ def list_blocks(
     lists: Lists,
     by_item: bool,
 ) -> Lists:
-    """Lists of the blocks that may have a hit: a lane for each square and block in it.
+    """Lists of the blocks that may have a hit: a thread for each square and block in it.
 
     by_item: name triangles by their item, else by their own number.
     """
     columns, rows = grid
-    number, k = lanes // BLOCKS, lanes % BLOCKS
+    number, k = threads // BLOCKS, threads % BLOCKS
     item, square = (dr.gather(types.UInt, values, number) for values in (squares.items, squares.squares))
     area, triangle, shape = _unpacked(types, test, large, item)
     x, y = square % columns, (square // columns) * BLOCKS + k
@@ -172,5 +172,5 @@ def list_blocks(
         reached = exists & (first <= last) & (start < left + PART) & (stop > left) & (start < stop)
         keep = reached & test.may_hit(shape, *samples.parts(types, block * PARTS + part, exists))
         bits |= dr.select(keep, types.UInt(1 << part), 0)
-    lists.add(types, lanes, block, item if by_item else triangle, bits, bits != 0)
+    lists.add(types, threads, block, item if by_item else triangle, bits, bits != 0)
     return lists

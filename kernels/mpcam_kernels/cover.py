@@ -1,6 +1,6 @@
-"""Pairs of a block and a triangle: which places of the block the triangle may cover, from the block's linear rays.
+"""Pairs of a block and a triangle: which slots of the block the triangle may cover, from the block's linear rays.
 
-The side on which a ray passes an edge is linear in its direction and moment, which are linear in the place but for a
+The side on which a ray passes an edge is linear in what is kept of the ray, which is linear in the position but for a
 known rest: so each edge is a line in the block, moved outwards by what the rest can amount to.
 """
 
@@ -14,27 +14,27 @@ from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
-SMALL = 48  # places between the lines that one lane walks by itself
+SMALL = 48  # slots between the lines that one thread walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
 def covered(
-    types: Any, test: Any, lane: Any, slopes: Rows, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
+    types: Any, test: Any, thread: Any, slopes: Any, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
 ) -> tuple[Any, Lists]:
-    """Lists of the triangles of pairs by block, and with `walking` which pairs are small enough for a lane to walk.
+    """Lists of the triangles of pairs by block, and with `walking` which pairs are small enough for a thread to walk.
 
-    room: pairs at a time, of which `lane` has some.
+    room: pairs at a time, of which `thread` has some.
     """
-    block, triangle = pairs.at(lane)
+    block, triangle = pairs.at(thread)
     shape = test.unpack(setups.at(types, triangle))
-    edges, front, back = _edges(types, shape, slopes, block)
+    edges, front, back = slopes.edges(types, shape, block)
     bits, small = _parts(types, edges, front, back), types.Bool(False)
     some = bits != 0
     if walking:
-        _, _, places = _box(types, _lines(types, edges, front))
-        small = some & ~(front & back) & (places <= SMALL)
-        some, small = some & ~small, small & (places > 0)
-    lists.add(types, lane % room, block, triangle, bits, some)
+        _, _, slots = _box(types, _lines(types, edges, front))
+        small = some & ~(front & back) & (slots <= SMALL)
+        some, small = some & ~small, small & (slots > 0)
+    lists.add(types, thread % room, block, triangle, bits, some)
     return small, lists
 
 
@@ -44,48 +44,28 @@ def walk_small(
     output: Any,
     number: Any,
     rays: Any,
-    slopes: Rows,
+    slopes: Any,
     setups: Rows,
     pairs: Any,
     buffer: Any,
     count: bool,
 ) -> tuple[Any, Any]:
-    """Raise `buffer` to the keys of small pairs by number; returns tests and hits of each lane."""
+    """Raise `buffer` to the keys of small pairs by number; returns tests and hits of each thread."""
     block, triangle = pairs.at(number)
     shape = test.unpack(setups.at(types, triangle))
-    edges, front, _ = _edges(types, shape, slopes, block)
+    edges, front, _ = slopes.edges(types, shape, block)
     lines = _lines(types, edges, front)
     columns, rows, _ = _box(types, lines)
     area = Region(columns[0], rows[0], columns[1], rows[1], lines)
 
-    def place(x: Any, y: Any) -> Any:
+    def slot(x: Any, y: Any) -> Any:
         return block * PIXELS + in_block(x, y)
 
-    return walk.walk(types, test, output, shape, shape.name, area, types.Bool(True), rays, place, buffer, count)
-
-
-def _edges(types: Any, shape: Any, slopes: Rows, block: Any) -> tuple[list[Any], Any, Any]:
-    """Per edge its value in the middle of the block, its slopes to the right and down, and what it may be off.
-
-    And whether rays may start in front of the triangle's plane, seen along the normal, and behind it: in front they hit
-    where all edges are positive, behind where all are negative.
-    """
-    d, m, d_right, m_right, d_down, m_down = slopes.at(types, block)
-    edges = []
-    for across, along in shape.edges:
-        slack = (d.w + 1e-6) * dr.norm(across)
-        slack += (m.w + 1e-6 * (1.0 + abs(m.x) + abs(m.y) + abs(m.z))) * dr.norm(along)
-        steps = [
-            dr.dot(a.xyz, across) + dr.dot(b.xyz, along) for a, b in ((d, m), (d_right, m_right), (d_down, m_down))
-        ]
-        edges.append((*steps, slack))
-    n, start = shape.normal, types.Array3f(d_right.w, m_right.w, d_down.w)
-    away, reach = shape.offset - dr.dot(n, start), dr.norm(n) * (m_down.w + 1e-6) + abs(shape.offset) * 1e-6
-    return edges, away + reach >= 0, away - reach <= 0
+    return walk.walk(types, test, output, shape, shape.name, area, types.Bool(True), rays, slot, buffer, count)
 
 
 def _lines(types: Any, edges: list[Any], front: Any) -> tuple[Any, Any, Any]:
-    """Lines around the places that triangles may cover of which rays start on one side only (see `regions`)."""
+    """Lines around the slots that triangles may cover of which rays start on one side only (see `regions`)."""
     sign, lines = dr.select(front, types.Float(1), -1), []
     for middle, right, down, slack in edges:
         a, b = sign * right * (1 / WIDE), sign * down * (1 / HIGH)
@@ -97,7 +77,7 @@ def _lines(types: Any, edges: list[Any], front: Any) -> tuple[Any, Any, Any]:
 
 
 def _box(types: Any, lines: tuple[Any, Any, Any]) -> tuple[tuple[Any, Any], tuple[Any, Any], Any]:
-    """Columns and rows between three lines, first and one past the last, and how many places they have.
+    """Columns and rows between three lines, first and one past the last, and how many slots they have.
 
     The box is that of the lines' three corners; where two are nearly parallel it is the whole block.
     """

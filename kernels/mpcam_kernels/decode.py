@@ -4,7 +4,8 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels.samples import places
+from mpcam_kernels.poses import placed
+from mpcam_kernels.samples import slots_of
 
 
 def triangles(types: Any, output: Any, keys: Any) -> Any:
@@ -27,16 +28,19 @@ def frame(types: Any, output: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
 
 def in_rows(kind: Any, values: Any, pixel: Any, width: int) -> Any:
     """Values kept in block order, for pixels that are numbered row by row."""
-    return dr.gather(kind, values, places(pixel, width))
+    return dr.gather(kind, values, slots_of(pixel, width))
 
 
-def weights(types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any, row: Any) -> tuple[Any, Any]:
+def weights(
+    types: Any, test: Any, vertices: Any, faces: Any, triangle: Any, samples: Any, row: Any, pose: Any = None
+) -> tuple[Any, Any]:
     """Barycentric weights of corners 2 and 3 where `samples` hit their triangles; 0 where triangle is -1.
 
-    vertices: a row (an array type) each, which starts with the position.
+    vertices: a row (an array type) each, which starts with the position; pose: brings them to the samples' frame.
     """
     hit = triangle >= 0
     corners = dr.gather(types.Array3u, faces, types.UInt(dr.maximum(triangle, 0)), hit)
-    shape = test.setup(*(dr.gather(row, vertices, corner, hit).xyz for corner in corners))
+    points = [dr.gather(row, vertices, corner, hit).xyz for corner in corners]
+    shape = test.setup(*(points if pose is None else (placed(types, pose, point) for point in points)))
     second, third = test.weights(shape, samples)
     return dr.select(hit, dr.clip(second, 0, 1), 0), dr.select(hit, dr.clip(third, 0, 1), 0)

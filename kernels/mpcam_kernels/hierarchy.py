@@ -1,17 +1,17 @@
-"""Which triangles, or points, a bundle of rays may meet: through groups of blocks and clusters of balls, step by step.
+"""Which triangles, or points, the rays of a cone may meet: through clusters of balls, step by step.
 
-Every step takes pairs of a bundle and a ball, refines one of the two, and marks the pairs that may meet. The balls are
-those around the triangles and, level by level, around FAN of the level below: of these a lane looks at all, since they
-share the bundle, and marks them in a mask; of a group's blocks each has its lane. Marks become new pairs by a prefix
-sum, which is quicker than a counter that all threads raise, and keeps the order.
+The balls are those around the triangles and, level by level, around FAN of the level below. Every step takes pairs of a
+cone and a ball that may meet, and marks in a mask which of the ball's children the cone may meet: one thread looks at
+all of them, since they share the cone. Masks become new pairs by a prefix sum, which is quicker than a counter that all
+threads raise, and keeps the order.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels.bundles import Cone, Cones, may_meet
 from mpcam_kernels.rows import Rows
 
 FAN = 8  # children of a cluster
@@ -19,14 +19,31 @@ FAN = 8  # children of a cluster
 
 @dataclass(frozen=True)
 class Pairs:
-    """Numbers of bundles and balls."""
+    """Numbers of cones (or what they are around) and of balls (or what these are around)."""
 
-    bundles: Any
+    cones: Any
     balls: Any
 
     def at(self, number: Any) -> tuple[Any, Any]:
         """Pairs by number."""
-        return dr.gather(type(number), self.bundles, number), dr.gather(type(number), self.balls, number)
+        return dr.gather(type(number), self.cones, number), dr.gather(type(number), self.balls, number)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """Pairs as those numbers of threads that found them, when each cone was held against each of `count` balls."""
+
+    threads: Any
+    count: int
+
+    def at(self, number: Any) -> tuple[Any, Any]:
+        """Pairs by number."""
+        return every_pair(dr.gather(type(number), self.threads, number), self.count)
+
+
+def every_pair(thread: Any, count: int) -> tuple[Any, Any]:
+    """Cone and ball of each thread, where each cone is held against each of `count` balls."""
+    return thread // count, thread % count
 
 
 def triangle_balls(types: Any, points: tuple[Any, Any, Any], usable: Any) -> Any:
@@ -61,61 +78,32 @@ def cluster_balls(types: Any, cluster: Any, balls: Rows, count: int) -> Any:
     return types.Array4f(*centre, radius)
 
 
-def meeting(types: Any, cone: Cone, balls: Rows, ball: Any, exists: Any, cull: bool) -> Any:
-    """Whether bundles and balls may meet; without `cull`, whether there are both."""
+def meeting(types: Any, cone: Any, balls: Rows, ball: Any, exists: Any, cull: bool) -> Any:
+    """Whether cones and balls may meet; without `cull`, whether there are both."""
     if cull:
-        return exists & may_meet(cone, *balls.at(types, ball, exists))
+        return exists & cone.may_meet(*balls.at(types, ball, exists))
     return exists & (dr.gather(types.Float, balls.flat, ball * 4 + 3, exists) >= 0)
 
 
-def children(lane: Any, step: tuple[Any, ...], before: Any) -> tuple[Any, Any, Any]:
-    """Bundle and ball of each lane of a step from pairs `before`, and whether there are such.
-
-    step: ("all", clusters): all pairs that there are; ("groups", fan, first, count): from a group to its blocks, which
-    begin at `first`, `fan` at most.
-    """
-    name, *rest = step
-    if name == "all":
-        return lane // rest[0], lane % rest[0], True
-    fan, first, count = rest
-    group, ball = before.at(lane // fan)
-    k = lane % fan
-    return dr.gather(type(lane), first, group) + k, ball, k < dr.gather(type(lane), count, group)
-
-
 def met_children(
-    types: Any, cones: Cones, pairs: Any, lane: Any, balls: Rows, count: int, cull: bool
+    types: Any, cones: Any, pairs: Any, thread: Any, balls: Rows, count: int, cull: bool
 ) -> tuple[Any, Any]:
-    """Which children of the clusters of pairs may meet the bundles, as a mask, and how many. count: of all balls."""
-    bundle, cluster = pairs.at(lane)
-    cone, mask = cones(types, bundle), types.UInt(0)
+    """Which children of the clusters of pairs may meet the cones, as a mask, and how many. count: of all balls."""
+    number, cluster = pairs.at(thread)
+    cone, mask = cones(types, number), types.UInt(0)
     for k in range(FAN):
         child = cluster * FAN + k
         mask |= dr.select(meeting(types, cone, balls, child, child < count, cull), types.UInt(1 << k), 0)
     return mask, dr.popcnt(mask)
 
 
-def write_children(types: Any, pairs: Any, lane: Any, mask: Any, place: Any, targets: Pairs) -> None:
-    """Write the pairs of bundles and children in masks, from a place on."""
-    bundle, cluster = pairs.at(lane)
+def write_pairs(pair: Callable[[Any], tuple[Any, Any]], mask: Any, place: Any, targets: Pairs) -> None:
+    """Write the pairs that masks stand for, from a place on; pair(bit) gives each."""
 
     def body(mask: Any, place: Any) -> tuple[Any, Any]:
-        dr.scatter(targets.bundles, bundle, place)
-        dr.scatter(targets.balls, cluster * FAN + dr.tzcnt(mask), place)
+        cone, ball = pair(dr.tzcnt(mask))
+        dr.scatter(targets.cones, cone, place)
+        dr.scatter(targets.balls, ball, place)
         return mask & (mask - 1), place + 1
 
     dr.while_loop((mask, place), lambda mask, place: mask != 0, body)
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """Pairs as the lanes of a step that found them: for few it is not worth writing them down."""
-
-    lanes: Any
-    step: tuple[Any, ...]
-    before: Any
-
-    def at(self, number: Any) -> tuple[Any, Any]:
-        """Pairs by number."""
-        bundle, ball, _ = children(dr.gather(type(number), self.lanes, number), self.step, self.before)
-        return bundle, ball

@@ -1,10 +1,10 @@
 """Nearest triangle of every pixel, by bounding each curved triangle and inverting per pixel; no rays are traced.
 
 One pass over the triangles outlines each image by a box and three lines. Triangles with few pixels inside are finished
-there: their lane walks the spans between the lines. The others are listed by block of 16 x 8 pixels, with the parts
+there: their thread walks the spans between the lines. The others are listed by block of 16 x 8 pixels, with the parts
 of 4 x 4 that they may cover; blocks and parts outside of the lines, and those that one edge excludes, are dropped. Then
-each lane takes eight pixels through their block's list with the nearest in registers. The result does not depend on the
-order of execution.
+each thread takes eight pixels through their block's list with the nearest in registers. The result does not depend on
+the order of execution.
 
 The kernels know arrays and functions only: `outline` bounds a triangle's image, `test` is `central`, `planar` or
 `projected`, `output` says what is kept of a pixel.
@@ -17,17 +17,17 @@ import drjit as dr
 
 from mpcam_kernels import blocks, pixels, walk
 from mpcam_kernels.frozen import frozen
-from mpcam_kernels.lanes import lanes
 from mpcam_kernels.outputs import OUTPUTS
 from mpcam_kernels.regions import Outline, region
-from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of, place
+from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of, slot_of
 from mpcam_kernels.samples import blocks as blocks_of
+from mpcam_kernels.threads import threads
 
-SMALL = 96  # pixels in a region that one lane walks by itself
+SMALL = 96  # pixels in a region that one thread walks by itself
 # Pairs of an item and a block held at a time, or PER_BLOCK for each block if these are more; the rest comes in chunks.
 PAIRS = 1 << 18
 PER_BLOCK = 4
-LANES = 1 << 22  # of those that look for pairs, at a time
+THREADS = 1 << 22  # of those that look for pairs, at a time
 
 
 class Pipeline:
@@ -42,7 +42,7 @@ class Pipeline:
     unpack. output: "hits", "depth" or "coverage". cull: "none", or "back" or "front" to leave out the triangles that
     turn this side to the eye. bounded: test all pixels inside of the outlines and none outside, as papers count them;
     else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and
-    hits. small: most pixels of a box that one lane walks.
+    hits. small: most pixels of a box that one thread walks.
     """
 
     def __init__(
@@ -78,8 +78,8 @@ class Pipeline:
         self._list, self._pixels = self._list_pass, self._pixel_pass
 
     @property
-    def places(self) -> int:
-        """Places of the buffer."""
+    def slots(self) -> int:
+        """Slots of the buffer."""
         return self.columns * self.rows * PIXELS
 
     def frame(
@@ -90,7 +90,7 @@ class Pipeline:
         samples: Samples,
         done: Callable[[str, Any], None] | None = None,
     ) -> tuple[Any, Any]:
-        """Keys of all places (see `outputs`), and counters (tests, hits) or None.
+        """Keys of all slots (see `outputs`), and counters (tests, hits) or None.
 
         vertices: arrays of four numbers per vertex; faces: 3 UInts per triangle. done(stage, arrays) is told after
         each pass.
@@ -98,10 +98,10 @@ class Pipeline:
         types = self.types
         counters = dr.zeros(types.UInt64, 2) if self.count else None
         if dr.width(faces) < 3:
-            buffer = dr.zeros(self.output.kind(types), self.places)
+            buffer = dr.zeros(self.output.kind(types), self.slots)
             dr.eval(buffer)
             return buffer, counters
-        triangles = lanes(types, 0, dr.width(faces) // 3)
+        triangles = threads(types, 0, dr.width(faces) // 3)
         numbers = 4 * dr.width(triangles)
         rows = [
             [dr.empty(types.Float, numbers * self.pieces) for _ in range(3)],
@@ -113,21 +113,21 @@ class Pipeline:
         items = large.count[0]
         per_item = blocks.share(items, *self.squares, self.pairs // blocks.BLOCKS)
         total = items * per_item
-        start, chunk = 0, min(total, LANES)
+        start, chunk = 0, min(total, THREADS)
         while start < total:
             chunk = min(chunk, total - start)
-            squares = self._find(lanes(types, start, start + chunk), per_item, samples, large)
+            squares = self._find(threads(types, start, start + chunk), per_item, samples, large)
             needed = squares.found[0] * blocks.BLOCKS
             if needed > self.pairs and chunk > 1:
                 chunk = max(1, chunk // (1 + needed // self.pairs))
                 continue
             if needed:
-                candidates = lanes(types, 0, needed)
+                candidates = threads(types, 0, needed)
                 room = blocks.room(types, needed, self.columns * self.rows)
                 lists = self._list(candidates, samples, large, squares, room)
                 if done:
                     done("lists", lists)
-                everywhere = lanes(types, 0, self.places // pixels.PER_LANE)
+                everywhere = threads(types, 0, self.slots // pixels.PER_THREAD)
                 buffer, counters = self._pixels(everywhere, samples, large, lists, buffer, counters)
                 if done:
                     done("pixels", buffer)
@@ -145,7 +145,7 @@ class Pipeline:
         rows: list[list[Any]],
     ) -> tuple[Any, blocks.Large, Any]:
         types, test = self.types, self.test
-        buffer = dr.zeros(self.output.kind(types), self.places)
+        buffer = dr.zeros(self.output.kind(types), self.slots)
         dr.make_opaque(buffer)
         large = blocks.Large(rows[0], rows[1], dr.zeros(types.UInt, 1))
         corners = dr.gather(types.Array3u, faces, triangle)
@@ -182,35 +182,35 @@ class Pipeline:
         return buffer, large, self._counted(counters, *counted)
 
     def _place(self, x: Any, y: Any) -> Any:
-        return place(x, y, self.width)
+        return slot_of(x, y, self.width)
 
-    def _find_pass(self, lanes: Any, per_item: int, samples: Samples, large: blocks.Large) -> blocks.Squares:
+    def _find_pass(self, threads: Any, per_item: int, samples: Samples, large: blocks.Large) -> blocks.Squares:
         most = self.pairs // blocks.BLOCKS
-        return blocks.find_squares(self.types, self._picker, lanes, per_item, samples, large, self.squares[0], most)
+        return blocks.find_squares(self.types, self._picker, threads, per_item, samples, large, self.squares[0], most)
 
     def _list_pass(
-        self, lanes: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares, lists: blocks.Lists
+        self, threads: Any, samples: Samples, large: blocks.Large, squares: blocks.Squares, lists: blocks.Lists
     ) -> blocks.Lists:
         grid = (self.columns, self.rows)
-        return blocks.list_blocks(self.types, self._picker, lanes, samples, large, grid, squares, lists, self.bounded)
+        return blocks.list_blocks(self.types, self._picker, threads, samples, large, grid, squares, lists, self.bounded)
 
     @property
     def _picker(self) -> Any:
         return _Everything(self.test) if self.bounded else self.test
 
     def _pixel_pass(
-        self, lane: Any, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
+        self, thread: Any, samples: Samples, large: blocks.Large, lists: blocks.Lists, buffer: Any, counters: Any
     ) -> tuple[Any, Any]:
-        def corner(place: Any) -> tuple[Any, Any]:
-            return pixel_of(self.types, place, self.width, self.height)[:2]
+        def corner(slot: Any) -> tuple[Any, Any]:
+            return pixel_of(self.types, slot, self.width, self.height)[:2]
 
         keys, *counted = pixels.through_lists(
-            self.types, self.test, self.output, lane, samples, large, lists, buffer, corner, self.bounded, self.count
+            self.types, self.test, self.output, thread, samples, large, lists, buffer, corner, self.bounded, self.count
         )
         return keys, self._counted(counters, *counted)
 
     def _counted(self, counters: Any, tests: Any, hits: Any) -> Any:
-        """The counters with tests and hits of all lanes added."""
+        """The counters with tests and hits of all threads added."""
         if self.count:
             for slot, value in enumerate((tests, hits)):
                 dr.scatter_reduce(dr.ReduceOp.Add, counters, self.types.UInt64(value), self.types.UInt(slot))

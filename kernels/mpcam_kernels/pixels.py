@@ -1,4 +1,4 @@
-"""Pixels through the lists of their blocks: the nearest surface in registers, eight neighbouring pixels a lane."""
+"""Pixels through the lists of their blocks: the nearest surface in registers, eight neighbouring pixels a thread."""
 
 import functools
 import operator
@@ -11,15 +11,15 @@ from mpcam_kernels import regions
 from mpcam_kernels.blocks import LINK, Large, Lists, set_up
 from mpcam_kernels.samples import PARTS, PIXELS
 
-PER_LANE = 8  # pixels of a lane, two rows of a part: a set-up that is gathered serves eight tests in registers
-FOURS = PER_LANE // 4
+PER_THREAD = 8  # pixels of a thread, two rows of a part: a set-up that is gathered serves eight tests in registers
+FOURS = PER_THREAD // 4
 
 
 def through_lists(
     types: Any,
     test: Any,
     output: Any,
-    lane: Any,
+    thread: Any,
     samples: Any,
     large: Large,
     lists: Lists,
@@ -28,30 +28,30 @@ def through_lists(
     bounded: bool,
     count: bool,
 ) -> tuple[Any, Any, Any]:
-    """Keys of all pixels after their lists and what `buffer` holds; and tests and hits of each lane.
+    """Keys of all pixels after their lists and what `buffer` holds; and tests and hits of each thread.
 
-    lane: the numbers of the lanes, PER_LANE pixels each; from outside, since a frozen kernel that counts them itself
+    thread: indices of threads, PER_THREAD pixels each; from outside, since a frozen kernel that counts them itself
     takes its size from any array of a multiple of it, and replays the size that this array has then.
-    buffer: keys so far, or the number of places where there are none yet. corner: from places to columns and rows, for
+    buffer: keys so far, or the number of slots where there are none yet. corner: from slots to columns and rows, for
     regions. bounded: pixels outside of a triangle's region are not tested.
     """
-    place = lane * PER_LANE
-    block, part = place // PIXELS, (place >> 4) % PARTS
+    slot = thread * PER_THREAD
+    block, part = slot // PIXELS, (slot >> 4) % PARTS
     four = types.Array4u64 if output.kind(types) is types.UInt64 else types.Array4u
-    fours = [lane * FOURS + k for k in range(FOURS)]
+    fours = [thread * FOURS + k for k in range(FOURS)]
     views: list[Any] = []
     if isinstance(buffer, int):  # nothing was drawn yet
-        before, result = [output.kind(types)(0)] * PER_LANE, dr.empty(output.kind(types), buffer)
+        before, result = [output.kind(types)(0)] * PER_THREAD, dr.empty(output.kind(types), buffer)
     else:
         before = [key for at in fours for key in dr.gather(four, buffer, at)]
         result = dr.empty(type(buffer), dr.width(buffer))
-    x, y = corner(place) if bounded else (place, place)
+    x, y = corner(slot) if bounded else (slot, slot)
     start = lists.first(types, block)
 
     def allowed(number: Any, mask: Any) -> list[Any]:
-        """Which pixels of the lane to test against a triangle."""
+        """Which pixels of the thread to test against a triangle."""
         if not bounded:
-            return [mask] * PER_LANE
+            return [mask] * PER_THREAD
         area, _ = regions.unpack(types, [dr.gather(types.Array4f, row, number) for row in large.regions])
         spans, inside = area.spans(types), []
         for line in range(FOURS):
@@ -62,7 +62,7 @@ def through_lists(
         return inside
 
     def sought(number: Any) -> Any:
-        """The next entry for the lane's part: looking on is cheap, a test with most lanes idle is not."""
+        """The next entry for the thread's part: looking on is cheap, a test with most threads idle is not."""
 
         def look(number: Any, found: Any) -> Any:
             link = lists.link(types, number)
@@ -104,7 +104,7 @@ def through_lists(
     best = [output.nearness(types, key) if output.depth else key > 0 for key in before]
 
     def draw(best: Any, owners: Any, tests: Any, hits: Any) -> Any:
-        views[:] = samples.run(types, place, PER_LANE)
+        views[:] = samples.run(types, slot, PER_THREAD)
         return dr.while_loop((best, owners, tests, hits, sought(start)), unfinished, body)[:4]
 
     state = (best, owners, types.UInt(0), types.UInt(0))
@@ -119,7 +119,7 @@ def through_lists(
     # One scatter in a loop: two to one array would be two kernels, each with all of the above.
     def store(k: Any) -> Any:
         chosen = [dr.select(k == 0, keys[i], keys[4 + i]) for i in range(4)]
-        dr.scatter(result, four(*chosen), lane * FOURS + k)
+        dr.scatter(result, four(*chosen), thread * FOURS + k)
         return (k + 1,)
 
     dr.while_loop((types.UInt(0),), lambda k: k < FOURS, store)

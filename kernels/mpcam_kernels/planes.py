@@ -10,7 +10,8 @@ from typing import Any
 import drjit as dr
 
 from mpcam_kernels import regions
-from mpcam_kernels.bundles import Cones
+from mpcam_kernels.poses import placed
+from mpcam_kernels.ray_cones import Cones
 from mpcam_kernels.samples import PART, PARTS
 
 
@@ -82,12 +83,12 @@ def _all(types: Any) -> Any:
 
 
 def items(
-    types: Any, bound: str, lane: Any, planes: Planes, vertices: Any, faces: Any, pairs: Any, cull: bool
+    types: Any, bound: str, thread: Any, planes: Planes, vertices: Any, faces: Any, pose: Any, pairs: Any, cull: bool
 ) -> tuple[Any, Any]:
     """Regions of pairs of a camera triangle and a triangle, and whether there is any; with `cull`, any pixel in it."""
-    face, triangle = pairs.at(lane)
+    face, triangle = pairs.at(thread)
     corners = dr.gather(types.Array3u, faces, triangle)
-    points = [dr.gather(types.Array3f, vertices, corner) for corner in corners]
+    points = [placed(types, pose, dr.gather(types.Array3f, vertices, corner)) for corner in corners]
     shape, side = outline(types, bound, planes, face, points)
     area, some = regions.region(types, shape, side, side)
     some &= dr.isfinite(points[0].x + points[0].y + points[0].z)
@@ -100,12 +101,12 @@ def items(
     return regions.pack(types, area, triangle), some
 
 
-def reached(types: Any, lane: Any, fan: int, planes: Planes, items: Items, corners: Any) -> tuple[Any, Any, Any]:
+def reached(types: Any, thread: Any, fan: int, planes: Planes, items: Items, corners: Any) -> tuple[Any, Any, Any]:
     """Item, block and parts that its region reaches, for each block of its camera triangle; fan: most of these.
 
     corners: first column and row of each block.
     """
-    item, k = lane // fan, lane % fan
+    item, k = thread // fan, thread % fan
     face = dr.gather(types.UInt, items.faces, item)
     exists = k < dr.gather(types.UInt, planes.count, face)
     block = dr.gather(types.UInt, planes.first, face) + k

@@ -2,7 +2,7 @@
 
 Blocks of 16 x 8 pixels follow each other row by row. Within a block come its eight parts of 4 x 4, and there the pixels
 row by row: the pixels that one triangle covers lie close together in memory. Blocks at the right and lower border may
-hold places without a pixel.
+hold slots without a pixel.
 """
 
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ NOWHERE = -1e9  # image coordinate that no triangle covers
 
 @dataclass(frozen=True)
 class Samples:
-    """One sample per place (ray directions or pixel centres), and bounds of the samples of squares of pixels.
+    """One sample per slot (ray directions or pixel centres), and bounds of the samples of squares of pixels.
 
-    coarse: bounds of squares of COARSE pixels, row by row; parts: of the parts of the blocks, in the order of places.
+    coarse: bounds of squares of COARSE pixels, row by row; parts: of the parts of the blocks, in the order of slots.
     """
 
     pixels: Any
     coarse: "Bounds"
     parts: "Bounds"
 
-    def at(self, types: Any, place: Any, active: Any = True) -> Any:
-        """Samples by place."""
-        return dr.gather(type(self.pixels), self.pixels, place, active)
+    def at(self, types: Any, slot: Any, active: Any = True) -> Any:
+        """Samples by slot."""
+        return dr.gather(type(self.pixels), self.pixels, slot, active)
 
     def run(self, types: Any, first: Any, count: int) -> list[Any]:
-        """Samples of `count` places, a multiple of four, from a multiple of four on."""
+        """Samples of `count` slots, a multiple of four, from a multiple of four on."""
         fours = [first // 4 + k for k in range(count // 4)]
         groups = [[dr.gather(types.Array4f, component, at) for component in self.pixels] for at in fours]
         return [type(self.pixels)(*(component[k] for component in group)) for group in groups for k in range(4)]
@@ -63,29 +63,29 @@ def blocks(width: int, height: int) -> tuple[int, int]:
 
 
 def in_block(x: Any, y: Any) -> Any:
-    """Place within its block of a column and a row of it."""
+    """Slot within its block of a column and a row of it."""
     return (y >> 2) << 6 | (x >> 2) << 4 | (y & 3) << 2 | (x & 3)
 
 
-def of_block(place: Any) -> tuple[Any, Any]:
-    """Column and row, within its block, of a place."""
-    return ((place >> 4) & 3) * 4 + (place & 3), ((place >> 6) & 1) * 4 + ((place >> 2) & 3)
+def of_block(slot: Any) -> tuple[Any, Any]:
+    """Column and row, within its block, of a slot."""
+    return ((slot >> 4) & 3) * 4 + (slot & 3), ((slot >> 6) & 1) * 4 + ((slot >> 2) & 3)
 
 
-def place(x: Any, y: Any, width: int) -> Any:
-    """Place of a pixel in block order."""
+def slot_of(x: Any, y: Any, width: int) -> Any:
+    """Slot of a pixel in block order."""
     block = (y // HEIGHT) * (-(-width // WIDTH)) + x // WIDTH
     part = ((y >> 2) & 1) * 4 + ((x >> 2) & 3)
     return block * PIXELS + (part << 4) + ((y & 3) << 2) + (x & 3)
 
 
-def places(pixel: Any, width: int) -> Any:
-    """Places of pixels that are numbered row by row."""
-    return place(pixel % width, pixel // width, width)
+def slots_of(pixel: Any, width: int) -> Any:
+    """Slots of pixels that are numbered row by row."""
+    return slot_of(pixel % width, pixel // width, width)
 
 
 def pixel_of(types: Any, index: Any, width: int, height: int) -> tuple[Any, Any, Any]:
-    """Column and row of a place, and whether there is a pixel."""
+    """Column and row of a slot, and whether there is a pixel."""
     columns, _ = blocks(width, height)
     block, part = index // PIXELS, (index >> 4) & 7
     x = (block % columns) * WIDTH + ((part & 3) << 2) + (index & 3)
@@ -151,9 +151,9 @@ def _bounds(types: Any, pixels: Any, left: Any, top: Any, side: int, width: int)
 
     def sample(k: Any) -> tuple[Any, Any, Any, Any]:
         x, y = left + k % side, top + k // side
-        within = (x < -(-width // WIDTH) * WIDTH) & (place(x, y, width) <= last)
+        within = (x < -(-width // WIDTH) * WIDTH) & (slot_of(x, y, width) <= last)
         s, t = (types.Float(k % side) - half) / half, (types.Float(k // side) - half) / half
-        d = dr.gather(types.Array3f, pixels, place(x, y, width), within)
+        d = dr.gather(types.Array3f, pixels, slot_of(x, y, width), within)
         return d, s, t, dr.squared_norm(d) > 0
 
     def add(k: Any, total: Any, found: Any) -> Any:

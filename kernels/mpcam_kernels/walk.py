@@ -1,4 +1,4 @@
-"""Small triangles: a lane walks the pixels of a region row by row; the nearest surface wins by an atomic maximum."""
+"""Small triangles: a thread walks the pixels of a region row by row; the nearest surface wins by an atomic maximum."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,19 +17,19 @@ def walk(
     area: Region,
     active: Any,
     samples: Any,
-    place: Callable[[Any, Any], Any],
+    slot: Callable[[Any, Any], Any],
     buffer: Any,
     count: bool,
 ) -> tuple[Any, Any]:
-    """Raise `buffer` to the triangle's keys at the pixels that it covers; returns tests and hits of each lane.
+    """Raise `buffer` to the triangle's keys at the pixels that it covers; returns tests and hits of each thread.
 
-    place: of a column and a row of the region.
+    slot: of a column and a row of the region.
     """
 
     spans = area.spans(types)
 
     def body(x: Any, end: Any, y: Any, tests: Any, hits: Any) -> Any:
-        pixel = place(types.UInt(x), types.UInt(y))
+        pixel = slot(types.UInt(x), types.UInt(y))
         within = x < end
         sample = samples.at(types, pixel, within)
         if output.depth:

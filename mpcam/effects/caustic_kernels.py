@@ -6,7 +6,7 @@ Positions are in the frame of the receivers' device mesh (`DeviceMesh`), or turn
 import functools
 from typing import Any
 
-from mpcam.rendering.device import placed, types
+from mpcam.rendering.device import types
 
 DENSITY = 2.0
 """Points that a landed triangle is dropped at, for each pixel that it covers."""
@@ -133,6 +133,7 @@ def plan(size: int, width: int, height: int, model: Any) -> Any:
     import drjit as dr
 
     from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.poses import placed
 
     @frozen
     def plan(number: Any, landed: Any, flux: Any, camera: Any, pose: Any) -> tuple[Any, Any]:
@@ -149,7 +150,7 @@ def plan(size: int, width: int, height: int, model: Any) -> Any:
             smooth &= (off <= _BEND * dr.norm(edge) + 1e-6) & (abs(dr.dot(normals[i], normals[j])) > 0.7)
         pixels = []
         for where in places:
-            image = camera.local_project(placed(pose, where))[0]
+            image = camera.local_project(placed(t, pose, where))[0]
             smooth &= image.valid
             pixels.append(image.pixel)
         (ax, ay), (bx, by), (cx, cy) = pixels
@@ -170,6 +171,7 @@ def drop(size: int, width: int, height: int, model: Any) -> Any:
     import drjit as dr
 
     from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.poses import placed
 
     @frozen
     def drop(
@@ -217,7 +219,7 @@ def drop(size: int, width: int, height: int, model: Any) -> Any:
         owner = dr.select(whole | chosen[0], ids[0], dr.select(chosen[1], ids[1], ids[2]))
         longest = dr.maximum(dr.norm(places[1] - places[0]), dr.norm(places[2] - places[0]))
         slack = dr.select(whole, 0.05 * longest, 0.0)
-        point = placed(pose, where)
+        point = placed(t, pose, where)
         image = camera.local_project(point)[0]
         u, v = image.pixel
         inside = image.valid & (u >= 0) & (v >= 0) & (u < width) & (v < height) & (power > 0)

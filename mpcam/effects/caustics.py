@@ -193,7 +193,7 @@ class Caustics:
     @exclusive
     def _surface(self) -> dict[str, Any]:
         """What photons need to know of the eye's pixels."""
-        device, pose = self._atlas, self._atlas.device.pose(self.camera)
+        device, pose = self._atlas, self._atlas.device.pose(self.camera.camera_from_world)
         seen = self.hits.device_triangle, self.hits.device_depth, lens(self.camera).ray.direction
         return kernels.surface()(seen, self._angles, pose, self._rays, device.vertices, device.faces, self._table)
 
@@ -203,24 +203,26 @@ class Caustics:
         """Irradiance of each pixel for a light of intensity 1, and the flux in view."""
         import drjit as dr
 
-        from mpcam_kernels.lanes import lanes
+        from mpcam_kernels.threads import threads
 
         t, size = types(), self.photons.camera.width
         width, height = self.camera.width, self.camera.height
-        eye, pose = lens(self.camera).on_device, self._atlas.device.pose(self.camera)
+        eye, pose = lens(self.camera).on_device, self._atlas.device.pose(self.camera.camera_from_world)
         many, flux, unit, surface = 2 * (size - 1) ** 2, self._rays["flux"], self._rays["unit"], self._surface
         model = (type(self.camera), tuple(getattr(self.camera, name) for name in self.camera.static_fields))
         plan = kernels.plan(size, width, height, model)
-        counts, smooth = plan(lanes(t, 0, many), self._landed, flux, eye, pose)
+        counts, smooth = plan(threads(t, 0, many), self._landed, flux, eye, pose)
         starts = dr.prefix_sum(counts)
         total = int(starts[many - 1] + counts[many - 1])
         dropped = dr.zeros(t.Float, width * height)
         dr.make_opaque(dropped, starts)
         drop = kernels.drop(size, width, height, model)
         for first in range(0, total, CHUNK):
-            number = lanes(t, first, min(total, first + CHUNK))
+            number = threads(t, first, min(total, first + CHUNK))
             dropped = drop(number, starts, counts, smooth, self._landed, flux, eye, pose, unit, surface, dropped)
-        irradiance = kernels.spread(width, height, self.settings.radius)(lanes(t, 0, width * height), surface, dropped)
+        irradiance = kernels.spread(width, height, self.settings.radius)(
+            threads(t, 0, width * height), surface, dropped
+        )
         whole: Any = dr.sum(t.Float64(dropped))
         return irradiance, float(whole[0])
 

@@ -14,14 +14,14 @@ import numpy as np
 from mpcam.cameras import three_rays
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.pose import frame_origin
 from mpcam.cameras.types import Ray
 from mpcam.decomposition.decompose import directions_at_vertices
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
-from mpcam.rendering.bundled import levels
-from mpcam.rendering.device import opaque_zero, placed, types
-from mpcam.rendering.device_rays import corner_rays
+from mpcam.rendering.camera_triangle_rays import corner_rays
+from mpcam.rendering.device import opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 
@@ -44,7 +44,10 @@ class VirtualVertices(VertexProjected):
         t, mesh = types(), self.mesh
         view = self.device.view(*self.device.rays(rays))
         self.view = lambda: view
-        table = corner_rays(cams, self.device)
+        pose = np.asarray(cams.camera_from_world, np.float64)
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = pose[:3, :3].T, frame_origin(pose) - self.device.anchor
+        table = corner_rays(cams, frame, self.device.scale)
         self.rays = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel()) + opaque_zero()
         self.cones = _cones(table)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -52,17 +55,19 @@ class VirtualVertices(VertexProjected):
         order = nearby(places) if mesh.triangle_count else np.zeros(1)
         self.order = t.UInt(order.astype(np.uint32)) + t.UInt(opaque_zero())
         self.points = self.parts.points if self.level else 1
-        self.counts = levels(len(places) * self.points)
+        from mpcam_kernels.candidates import levels
+
+        self.counts = levels(len(places) * self.points, cams.count)
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
         from mpcam_kernels.backend import backend_name
-        from mpcam_kernels.lanes import lanes
         from mpcam_kernels.rows import room
+        from mpcam_kernels.threads import threads
 
         t, total = types(), self.counts[0]
-        every = lanes(t, 0, total)
+        every = threads(t, 0, total)
         unbounded = self.camera.domain.image_radius is None
         candidates, balls, nearest, pixels = _kernels(type(self.camera), unbounded, self.points, backend_name())
         points = balls(every, vertices, self.corners, self.parts.grid, self.order, room(t, 1, total))
@@ -70,7 +75,7 @@ class VirtualVertices(VertexProjected):
         dr.make_opaque(keys)
         met = candidates.met(self.counts, self.cones, candidates.levels(points, self.counts))
         for pairs, number in met:
-            keys = nearest(lanes(t, 0, number), pairs, points, self.rays, keys)
+            keys = nearest(threads(t, 0, number), pairs, points, self.rays, keys)
         target = dr.empty(t.Float, 4 * total)
         lens = (self.lens.on_device, self.pose, self.unit)
         return [pixels(every, keys, points, self.rays, self.order, target, *lens)]
@@ -109,9 +114,9 @@ def _cones(table: np.ndarray) -> Any:
     """Bounds of the rays of camera triangles, from those of their corners (6, 3, F): positions and directions between
     lie within the hull of the corners', and a cap that holds three directions holds those between them.
     """
-    from mpcam_kernels.bundles import Cone, Cones
-    from mpcam_kernels.lanes import lanes
+    from mpcam_kernels.ray_cones import Cone, Cones
     from mpcam_kernels.rows import room
+    from mpcam_kernels.threads import threads
 
     t, count = types(), table.shape[2]
     places, ways = table[0::2], table[1::2] / np.linalg.norm(table[1::2], axis=1, keepdims=True)
@@ -125,7 +130,7 @@ def _cones(table: np.ndarray) -> Any:
     numbers = [np.ascontiguousarray(values, np.float32) for values in (centre, reach, axis, spread)]
     cone = Cone(t.Array3f(numbers[0]), t.Float(numbers[1]), t.Array3f(numbers[2]), t.Float(numbers[3]), t.Float(0))
     target = room(t, 2, count)
-    target.store(cone.rows(t), lanes(t, 0, count))
+    target.store(cone.rows(t), threads(t, 0, count))
     return Cones(target)
 
 
@@ -142,6 +147,7 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
     from mpcam_kernels.candidates import CULLING, Candidates
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.outputs import Hits
+    from mpcam_kernels.poses import placed
     from mpcam_kernels.rows import Rows
 
     def mapped(order: Any, number: Any) -> Any:
@@ -175,9 +181,9 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
         return target
 
     @frozen
-    def nearest(lane: Any, pairs: Any, points: Rows, rays: Any, keys: Any) -> Any:
+    def nearest(thread: Any, pairs: Any, points: Rows, rays: Any, keys: Any) -> Any:
         t = types()
-        face, number = pairs.at(lane)
+        face, number = pairs.at(thread)
         (ball,) = points.at(t, number)
         _, distance, valid = image(face, ball.xyz, rays, True)
         nearness = 1.0 / dr.maximum(distance, 1e-30)
@@ -191,7 +197,7 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
         t, seen = types(), keys != 0
         (ball,) = points.at(t, number)
         place, distance, valid = image(dr.select(seen, Hits.triangle(t, keys), 0), ball.xyz, rays, seen)
-        row = corner(camera, placed(pose, place), distance * unit, unbounded)
+        row = corner(camera, placed(types(), pose, place), distance * unit, unbounded)
         row.z = dr.select(seen & valid, row.z, dr.nan)
         dr.scatter(target, row, mapped(order, number))
         return target

@@ -55,23 +55,23 @@ def _unrolled(prepared: Inverted, triangles: int) -> Any:
     from mpcam.rendering.device import types
     from mpcam_kernels import central
     from mpcam_kernels.frozen import frozen
-    from mpcam_kernels.pixels import PER_LANE
+    from mpcam_kernels.pixels import PER_THREAD
 
-    t, fours = types(), PER_LANE // 4
+    t, fours = types(), PER_THREAD // 4
     corners = np.asarray(prepared.place(prepared.vertices)[0].numpy()).reshape(triangles, 3, 4)[..., :3]
     shapes = []
     for triangle in corners:
         shape = central.setup(*(t.Array3f(*map(float, corner)) for corner in triangle))
         numbers = [[float(n) for n in np.ravel(row.numpy())] for row in (*shape.edges, shape.plane)]
         shapes.append(numbers)
-    lanes = prepared.camera.width * prepared.camera.height // PER_LANE
+    threads = prepared.camera.width * prepared.camera.height // PER_THREAD
 
     @frozen
     def kernel(components: list[Any]) -> tuple[Any, Any]:
-        lane = dr.arange(t.UInt, lanes)
-        groups = [[dr.gather(t.Array4f, c, lane * fours + k) for c in components] for k in range(fours)]
+        thread = dr.arange(t.UInt, threads)
+        groups = [[dr.gather(t.Array4f, c, thread * fours + k) for c in components] for k in range(fours)]
         views = [t.Array3f(*(component[k] for component in group)) for group in groups for k in range(4)]
-        best, owners = [t.Float(0)] * PER_LANE, [t.UInt(0xFFFFFFFF)] * PER_LANE
+        best, owners = [t.Float(0)] * PER_THREAD, [t.UInt(0xFFFFFFFF)] * PER_THREAD
         for number, rows in enumerate(shapes):
             *edges, plane = (t.Array3f(*row) for row in rows)
             shape = central.CentralTriangle((edges[0], edges[1], edges[2]), plane, True)

@@ -79,7 +79,7 @@ class Buffered:
         self.vertices, self.faces = self.device.vertices, self.device.faces
         self.lens: Lens = lens(camera)
         self.samples = self.lens.directions if self.curved else self.lens.centres
-        self.pose = self.device.pose(camera)
+        self.pose = self.device.pose(camera.camera_from_world)
         self.unit = opaque_numbers([self.device.scale])[0]
 
     @exclusive
@@ -118,9 +118,9 @@ class Buffered:
     @property
     def pixels(self) -> Any:
         """Numbers of the pixels, row by row."""
-        from mpcam_kernels.lanes import lanes
+        from mpcam_kernels.threads import threads
 
-        return lanes(types(), 0, self.camera.width * self.camera.height)
+        return threads(types(), 0, self.camera.width * self.camera.height)
 
     @property
     def triangle_count(self) -> int:

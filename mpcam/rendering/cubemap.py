@@ -199,7 +199,7 @@ def _frozen_look_up(resolution: int, half: bool) -> Any:
         for buffer, (width, height, start) in zip(buffers, _layout(resolution, half), strict=True):
             inside = valid & (texel >= start) & (texel < start + width * height)
             local = texel - start
-            at = samples.place(local % width, local // width, width)
+            at = samples.slot_of(local % width, local // width, width)
             found = dr.select(inside, dr.gather(t.UInt64, buffer, at, inside), found)
         return decode.triangles(t, KeptHits, found), decode.depths(t, KeptHits, found, unit), texel
 

@@ -46,6 +46,7 @@ class DeviceMesh:
         self.scale = extent if extent > 0 else 1.0
         self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
         self.vertices = self.place(mesh.vertices)
+        self.ordered: Any = None  # by who wants neighbors together
 
     def place(self, vertices: np.ndarray) -> Any:
         """Other positions of the same vertices, uploaded; raises InputError unless there are as many of them."""
@@ -80,12 +81,14 @@ class DeviceMesh:
         dr.eval(ray)
         return View(pose, ray)
 
-    def pose(self, camera: Camera) -> list[Any]:
-        """Rotation (9) and shift (3) from device vertices to the camera frame in units of `scale`, opaque."""
-        matrix = np.asarray(camera.camera_from_world, np.float64)
+    def pose(self, frame_from_world: Any) -> list[Any]:
+        """Rotation (9) and shift (3) from device vertices to a frame in units of `scale`, opaque.
+
+        frame_from_world: 4x4, rigid, scene units.
+        """
+        matrix = np.asarray(frame_from_world, np.float64)
         shift = (matrix[:3, :3] @ self.anchor + matrix[:3, 3]) / self.scale
-        numbers = [*matrix[:3, :3].ravel(), *shift]
-        return opaque_numbers(numbers)
+        return opaque_numbers([*matrix[:3, :3].ravel(), *shift])
 
 
 def opaque_numbers(numbers: list[Any]) -> list[Any]:
@@ -134,10 +137,22 @@ def _plain(value: Any) -> Any:
         return tuple(_plain(v) for v in value)
     if value is None or isinstance(value, (str, int, Profile)):
         return value
-    if np.ndim(value) > 0:
+    return _Table(value) if np.ndim(value) > 0 else float(value)
+
+
+class _Table:
+    """A large array, told apart by which object it is, small ones by what they hold: cameras are not changed."""
+
+    def __init__(self, value: Any):
+        self.value = value
         table = np.asarray(value)
-        return table.shape, table.dtype.str, table.tobytes()
-    return float(value)
+        self._key = id(value) if table.nbytes > 4096 else (table.shape, table.dtype.str, table.tobytes())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Table) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
 
 
 def device_lens(camera: Camera) -> Camera:
@@ -174,20 +189,28 @@ def _check_profile(profile: Any) -> None:
 
 
 class Lens:
-    """Rays and kernels' view of a camera, which hold for every pose of it."""
+    """Rays and kernels' view of a camera, which hold for every pose of it.
+
+    ray: of each pixel, row by row, on the device, in the camera's frame, from `anchor` (3,), a point of that frame.
+    kept: what others make of the rays.
+    """
 
     def __init__(self, camera: Camera):
+        _check_profile(getattr(camera, "profile", None))
+        self.size: tuple[int, int] = (camera.width, camera.height)
+        self.kept: dict[Any, Any] = {}
+        plain = camera.ray_geometry != "general"  # others may hold tables
+        self.on_device = device_lens(camera) if plain else camera
+        self.central = camera.ray_geometry == "central"
+        self.ray, self.anchor = pixel_rays(self.on_device)
+
+    @functools.cached_property
+    def has_center(self) -> bool:
+        """Whether all rays leave from the anchor."""
         import drjit as dr
 
-        from mpcam_kernels import samples
-
-        _check_profile(getattr(camera, "profile", None))
-        alike = camera.ray_geometry != "general"  # others keep their tables, which kernels read in a form of their own
-        self.on_device, self.size = device_lens(camera) if alike else camera, (camera.width, camera.height)
-        self.ray = need(self.on_device, HasRays, "a frame").local_ray(
-            samples.pixel_centres(types(), camera.width, camera.height)
-        )
-        dr.eval(self.ray)
+        away: Any = dr.any(self.ray.valid & (dr.squared_norm(self.ray.origin) > 0))
+        return self.central or not away[0]
 
     @functools.cached_property
     def directions(self) -> Any:
@@ -202,6 +225,68 @@ class Lens:
         from mpcam_kernels import samples
 
         return samples.planar_samples(types(), self.ray.valid, *self.size)
+
+
+def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
+    """Rays of all pixels, row by row, on the device, and the point of the camera's frame (3,) from which origins count.
+
+    Raises InputError where the camera's `local_ray` gives them neither for Dr.Jit nor for NumPy arrays.
+    """
+    import drjit as dr
+
+    from mpcam_kernels import samples
+
+    local_ray, t = need(camera, HasRays, "a frame").local_ray, types()
+    centres = samples.pixel_centres(t, camera.width, camera.height)
+    try:
+        ray = local_ray(centres)
+    except (TypeError, ValueError, AttributeError, RuntimeError, InputError):
+        ray = None
+    numbers = () if ray is None else (*ray.origin, *ray.direction, ray.valid)
+    if ray is not None and all(library(number) == "drjit" or np.ndim(number) == 0 for number in numbers):
+        ray, anchor = Ray(t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:6]), t.Bool(ray.valid)), np.zeros(3)
+        if camera.ray_geometry == "general":
+            ray, anchor = _anchored(ray)
+    else:  # written for NumPy alone
+        ray, anchor = _uploaded(local_ray(np.asarray(centres.numpy(), np.float64)), camera)
+    dr.eval(ray)
+    return ray, anchor
+
+
+def _anchored(ray: Ray) -> tuple[Ray, np.ndarray]:
+    """Rays around the middle of their origins, on the device."""
+    import drjit as dr
+
+    usable = ray.valid & dr.isfinite(ray.origin.x + ray.origin.y + ray.origin.z)
+    ends = [dr.min(dr.select(usable, part, dr.inf)) for part in ray.origin]
+    ends += [dr.max(dr.select(usable, part, -dr.inf)) for part in ray.origin]
+    low, high = np.array([end[0] for end in ends], np.float64).reshape(2, 3)
+    if not (low <= high).all():
+        return ray, np.zeros(3)
+    anchor = (0.5 * low + 0.5 * high).astype(np.float32).astype(np.float64)
+    return ray._replace(origin=dr.select(usable, ray.origin - types().Array3f(*anchor.tolist()), 0)), anchor
+
+
+def _uploaded(ray: Ray, camera: Camera) -> tuple[Ray, np.ndarray]:
+    """Rays of NumPy arrays, components first, on the device, around the middle of their origins."""
+    count, t = camera.width * camera.height, types()
+    try:
+        origin, direction = (
+            np.stack([np.broadcast_to(np.asarray(part, np.float64), count) for part in parts])
+            for parts in (ray.origin, ray.direction)
+        )
+        valid = np.broadcast_to(np.asarray(ray.valid, bool), count)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{type(camera).__name__}.local_ray gives no rays of {count} pixels ({error}): return mpcam.Ray(origin, "
+            "direction, valid), vectors with their components first"
+        ) from None
+    valid = valid & np.isfinite(origin).all(0) & np.isfinite(direction).all(0)
+    some = origin[:, valid]
+    anchor = 0.5 * some.min(axis=1) + 0.5 * some.max(axis=1) if valid.any() else np.zeros(3)
+    parts = (np.where(valid, origin - anchor[:, None], 0.0), np.where(valid, direction, 0.0))
+    origin, direction = (t.Array3f(np.ascontiguousarray(part, np.float32)) + opaque_zero() for part in parts)
+    return Ray(origin, direction, t.Bool(np.ascontiguousarray(valid))), anchor
 
 
 @functools.lru_cache(maxsize=16)
@@ -233,11 +318,6 @@ def to_camera(pose: list[Any], vertices: Any, count: Any) -> Any:
     """Device vertices numbered by `count` in the camera frame, in units of the mesh's scale."""
     import drjit as dr
 
-    return placed(pose, dr.gather(types().Array3f, vertices, count))
+    from mpcam_kernels.poses import placed
 
-
-def placed(pose: list[Any], point: Any) -> Any:
-    """Points in another frame; pose: nine numbers of a rotation, three of a shift."""
-    x, y, z = point
-    rows = [pose[3 * i] * x + pose[3 * i + 1] * y + pose[3 * i + 2] * z + pose[9 + i] for i in range(3)]
-    return types().Array3f(*rows)
+    return placed(types(), pose, dr.gather(types().Array3f, vertices, count))

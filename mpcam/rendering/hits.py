@@ -66,9 +66,9 @@ class Hits:
     @exclusive
     def view(self) -> View:
         """The rays; those of the camera unless something else found the hits."""
-        from mpcam.rendering.device import lens
+        from mpcam.rendering.ray_blocks import lens_view
 
-        return self._view() if self._view else View(np.asarray(self.camera.camera_from_world), lens(self.camera).ray)
+        return self._view() if self._view else lens_view(self.camera)
 
     @cached_property
     @exclusive

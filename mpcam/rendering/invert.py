@@ -42,9 +42,9 @@ class Inverted(Buffered):
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
-        from mpcam_kernels.lanes import lanes
+        from mpcam_kernels.threads import threads
 
-        number = lanes(types(), 0, dr.width(vertices) // 3)
+        number = threads(types(), 0, dr.width(vertices) // 3)
         rows = ROWS[self.bound] if self.curved else 1
         targets = [dr.empty(types().Float, 4 * dr.width(number)) for _ in range(rows)]
         model = type(self.camera)

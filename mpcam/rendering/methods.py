@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Images, Outlines
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.scene import Scene
@@ -49,8 +50,7 @@ def prepare(
         )
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
-    alike = camera.ray_geometry != "general"
-    invert = ("bound", "cull") if alike else ("bound", "cull", "culling")
+    invert = ("bound", "cull") if _outlined(camera) else ("bound", "cull", "culling")
     kinds = {"invert": invert, "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
         raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
@@ -69,12 +69,18 @@ def prepare(
     return _kind(method, camera)(camera, mesh, **settings)
 
 
+def _outlined(camera: Camera) -> bool:
+    """Whether images of triangles are outlined from their corners, which is faster than from the pixels' rays."""
+    capability = {"central": Outlines, "parallel": Images, "general": None}[camera.ray_geometry]
+    return capability is not None and isinstance(camera, capability)
+
+
 def _kind(method: str, camera: Camera) -> Any:
     """The class of a method for a camera; each is imported only when it is asked for."""
-    if method == "invert" and camera.ray_geometry == "general":
-        from mpcam.rendering.bundled import Bundled
+    if method == "invert" and not _outlined(camera):
+        from mpcam.rendering.general import GeneralRasterizer
 
-        return Bundled
+        return GeneralRasterizer
     if method == "invert":
         from mpcam.rendering.invert import Inverted
 

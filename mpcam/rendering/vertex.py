@@ -46,10 +46,10 @@ class VertexProjected(Buffered):
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
 
-        from mpcam_kernels.lanes import lanes
+        from mpcam_kernels.threads import threads
 
         points = self.parts.points * self.mesh.triangle_count if self.level else dr.width(vertices) // 3
-        number = lanes(types(), 0, points)
+        number = threads(types(), 0, points)
         target = dr.empty(types().Float, 4 * points)
         place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
         data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)

@@ -10,8 +10,8 @@ import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.bundled import BOUNDS, Bundled
 from mpcam.rendering.device import types
+from mpcam.rendering.general import BOUNDS, GeneralRasterizer
 from mpcam.stress.report import Case
 
 SIDE, FACES, TRIANGLES = 20, 10, 2000
@@ -26,7 +26,7 @@ def bound_cases(kind: str, pairs: int) -> list[Case]:
         true = pairs_that_hit(camera, mesh)
         tried += camera.count * mesh.triangle_count
         for bound in BOUNDS:
-            missed[bound] += abs(true - Bundled(camera, mesh, bound).frame().stats.rendered)
+            missed[bound] += abs(true - GeneralRasterizer(camera, mesh, bound).frame().stats.rendered)
     return [
         Case("camera-triangles", f"{bound}, {kind}", "float32", tried, float("nan"), count, 0)
         for bound, count in missed.items()
@@ -89,22 +89,24 @@ def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:
     """How many pairs of a pixel and a triangle hit: each tested against each, by the kernels' own test."""
     import drjit as dr
 
-    from mpcam_kernels import skew
+    from mpcam_kernels import plucker
+    from mpcam_kernels.poses import placed
 
     t = types()
-    prepared = Bundled(camera, mesh)
-    rays, vertices, faces = prepared.rays.bundle.pixels, prepared.vertices, prepared.faces
-    place = dr.arange(t.UInt, dr.width(rays.rows.flat) // 8)
-    each = rays.at(t, place)
+    prepared = GeneralRasterizer(camera, mesh)
+    rays, vertices, faces = prepared.rays.blocks.rays, prepared.vertices, prepared.faces
+    slot = dr.arange(t.UInt, dr.width(rays.rows.flat) // 8)
+    each = rays.at(t, slot)
 
     def step(number: Any, hits: Any) -> tuple[Any, Any]:
         corners = [dr.gather(t.UInt, faces, number * 3 + k) for k in range(3)]
-        shape = skew.setup(*(dr.gather(t.Array3f, vertices, corner) for corner in corners))
-        covered = skew.inside(shape, each) & shape.usable
+        points = (placed(t, prepared.pose, dr.gather(t.Array3f, vertices, corner)) for corner in corners)
+        shape = plucker.setup(*points)
+        covered = plucker.inside(shape, each) & shape.usable
         return number + 1, hits + dr.select(covered, t.UInt(1), 0)
 
     count = mesh.triangle_count
-    start = t.UInt(0) + place * 0, t.UInt(0) + place * 0
+    start = t.UInt(0) + slot * 0, t.UInt(0) + slot * 0
     _, hits = dr.while_loop(start, lambda number, hits: number < count, step)
     total: Any = dr.sum(t.UInt64(hits))
     return int(total[0])

@@ -12,6 +12,7 @@ from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats, View
+from mpcam.rendering.ray_blocks import device_rays, from_anchor
 from mpcam.truth.meshes import mitsuba_mesh, move, position_key
 from mpcam.truth.variant import mitsuba
 
@@ -19,11 +20,11 @@ from mpcam.truth.variant import mitsuba
 def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
     """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
     if isinstance(camera, CameraTriangles):
-        from mpcam.rendering.device_rays import DeviceRays
-
-        return DeviceRays(camera, device).in_rows()
-    origin, direction, valid = lens(camera).ray
-    pose, scale = device.pose(camera), 1.0 / device.scale
+        rays = device_rays(camera, device)
+        (origin, direction, valid), frame = rays.rows(), rays.pose(camera)
+    else:
+        (origin, direction, valid), frame = lens(camera).ray, from_anchor(camera, lens(camera).anchor)
+    pose, scale = device.pose(frame), 1.0 / device.scale
     moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
     columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
     world = [sum(columns[i][j] * moved[j] for j in range(3)) for i in range(3)]

@@ -1,16 +1,14 @@
-"""Which rays hit a triangle, for rays with any origin and direction: Pluecker coordinates.
+"""Which rays hit a triangle, for rays with any origin and direction: Plücker coordinates.
 
 A ray from o along d passes the edge from a to b on the side that the sign of d . (a x b) + (o x d) . (b - a) tells. It
 hits where the signs of the three edges agree.
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
 
 from mpcam_kernels.central import follows
-from mpcam_kernels.rows import Rows
 
 Float = Any
 Vector = Any
@@ -24,30 +22,7 @@ class Ray(NamedTuple):
     origin: Vector
 
 
-@dataclass(frozen=True)
-class Rays:
-    """Rays in memory, two rows each: direction and how far the origin lies along it; moment, and 0."""
-
-    rows: Rows
-
-    def at(self, types: Any, number: Any, active: Any = True) -> Ray:
-        """Rays by number. The origin is direction x moment, the point nearest to (0, 0, 0), plus its part along."""
-        first, second = self.rows.at(types, number, active)
-        direction, moment = first.xyz, second.xyz
-        return Ray(direction, moment, dr.fma(direction, first.w, dr.cross(direction, moment)))
-
-    def run(self, types: Any, first: Any, count: int) -> list[Ray]:
-        """So many rays from a number on."""
-        return [self.at(types, first + k) for k in range(count)]
-
-
-def packed(types: Any, direction: Vector, origin: Vector) -> list[Any]:
-    """The rows in which rays are kept."""
-    along = dr.dot(direction, origin)
-    return [types.Array4f(*direction, along), types.Array4f(*dr.cross(origin, direction), 0)]
-
-
-class SkewTriangle(NamedTuple):
+class PluckerTriangle(NamedTuple):
     """Per edge a x b and b - a; the normal, not of unit length, its inner product with a corner, and the number."""
 
     edges: tuple[tuple[Vector, Vector], ...]
@@ -66,16 +41,16 @@ def _edge(p: Vector, q: Vector) -> tuple[Vector, Vector]:
     return dr.select(swap, -across, across), dr.select(swap, -along, along)
 
 
-def setup(a: Vector, b: Vector, c: Vector) -> SkewTriangle:
+def setup(a: Vector, b: Vector, c: Vector) -> PluckerTriangle:
     """Edges and plane of triangles with corners a, b, c; unusable where they have no area."""
     normal = dr.cross(b - a, c - a)
     squared = dr.squared_norm(normal)
-    return SkewTriangle(
+    return PluckerTriangle(
         (_edge(b, c), _edge(c, a), _edge(a, b)), normal, dr.dot(normal, a), (squared > 0) & dr.isfinite(squared)
     )
 
 
-def _sides(triangle: SkewTriangle, ray: Ray) -> list[Float]:
+def _sides(triangle: PluckerTriangle, ray: Ray) -> list[Float]:
     d, m = ray.direction, ray.moment
     return [
         dr.fma(d.x, n.x, dr.fma(d.y, n.y, dr.fma(d.z, n.z, dr.fma(m.x, e.x, dr.fma(m.y, e.y, m.z * e.z)))))
@@ -83,7 +58,7 @@ def _sides(triangle: SkewTriangle, ray: Ray) -> list[Float]:
     ]
 
 
-def hit(triangle: SkewTriangle, ray: Ray) -> tuple[Any, Float]:
+def hit(triangle: PluckerTriangle, ray: Ray) -> tuple[Any, Float]:
     """Whether lines run between the three edges, and the inverse of the distance along the ray.
 
     Rays hit where both hold: between the edges, and an inverse distance above zero.
@@ -95,13 +70,13 @@ def hit(triangle: SkewTriangle, ray: Ray) -> tuple[Any, Float]:
     return ((lowest >= 0) | (highest <= 0)) & (away != 0), dr.dot(ray.direction, triangle.normal) / away
 
 
-def inside(triangle: SkewTriangle, ray: Ray) -> Any:
+def inside(triangle: PluckerTriangle, ray: Ray) -> Any:
     """Whether rays hit."""
     covered, nearness = hit(triangle, ray)
     return covered & (nearness > 0)
 
 
-def weights(triangle: SkewTriangle, ray: Ray) -> tuple[Float, Float]:
+def weights(triangle: PluckerTriangle, ray: Ray) -> tuple[Float, Float]:
     """Barycentric weights of corners b and c at the point that a ray hits."""
     e0, e1, e2 = _sides(triangle, ray)
     scale = 1.0 / (e0 + e1 + e2)
@@ -111,7 +86,7 @@ def weights(triangle: SkewTriangle, ray: Ray) -> tuple[Float, Float]:
 ROWS = 6  # rows of four numbers that a set-up packs into
 
 
-def pack(types: Any, triangle: SkewTriangle, name: Any) -> list[Any]:
+def pack(types: Any, triangle: PluckerTriangle, name: Any) -> list[Any]:
     """The set-up and the number of the triangle, in rows of four numbers."""
     (n0, e0), (n1, e1), (n2, e2) = triangle.edges
     number = dr.reinterpret_array(types.Float, types.UInt(name))
@@ -119,10 +94,35 @@ def pack(types: Any, triangle: SkewTriangle, name: Any) -> list[Any]:
     return [types.Array4f(*row) for row in rows]
 
 
-def unpack(rows: list[Any]) -> SkewTriangle:
+def unpack(rows: list[Any]) -> PluckerTriangle:
     """The set-up of a usable triangle from its rows."""
     first, second, third, fourth, fifth, last = rows
     e2 = type(first.xyz)(second.w, third.w, fourth.w)
     edges = ((first.xyz, second.xyz), (third.xyz, fourth.xyz), (fifth.xyz, e2))
     name = dr.reinterpret_array(dr.uint32_array_t(type(fifth.w)), fifth.w)
-    return SkewTriangle(edges, last.xyz, first.w, True, name)
+    return PluckerTriangle(edges, last.xyz, first.w, True, name)
+
+
+class OneSided:
+    """The same test for triangles of which one side is not shown: "back" or "front".
+
+    Corners run counter-clockwise seen from the front. Rays that come from there run against the normal, and pass all
+    edges on the negative side.
+    """
+
+    ROWS = ROWS
+    setup, pack = staticmethod(setup), staticmethod(pack)
+    unpack, weights = staticmethod(unpack), staticmethod(weights)
+
+    def __init__(self, cull: str):
+        self.sign = {"back": -1.0, "front": 1.0}[cull]
+
+    def hit(self, triangle: PluckerTriangle, ray: Ray) -> tuple[Any, Float]:
+        """As `hit`, where the side is shown."""
+        covered, nearness = hit(triangle, ray)
+        return covered & (self.sign * dr.dot(ray.direction, triangle.normal) > 0), nearness
+
+    def inside(self, triangle: PluckerTriangle, ray: Ray) -> Any:
+        """As `inside`, where the side is shown."""
+        covered, nearness = self.hit(triangle, ray)
+        return covered & (nearness > 0)
