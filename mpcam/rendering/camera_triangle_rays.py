@@ -58,7 +58,7 @@ def _in_rows(blocks: Any, slots: Any, scale: float) -> Ray:
     origin, direction = blocks.rays.origin_and_direction(t, t.UInt(dr.maximum(slots, 0)))
     valid = valid & (dr.squared_norm(direction) > 0)
     ray = Ray(origin * opaque_numbers([scale])[0], dr.select(valid, direction, t.Array3f(0, 0, 1)), valid)
-    dr.eval(ray)
+    dr.eval(*ray)
     return ray
 
 

@@ -78,7 +78,7 @@ class DeviceMesh:
         pose = np.eye(4)
         pose[:3, 3] = -self.anchor
         ray = Ray(origin * opaque_numbers([self.scale])[0], direction, valid)
-        dr.eval(ray)
+        dr.eval(*ray)  # of a named tuple it would do nothing
         return View(pose, ray)
 
     def pose(self, frame_from_world: Any) -> list[Any]:
@@ -249,7 +249,7 @@ def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
             ray, anchor = _anchored(ray)
     else:  # written for NumPy alone
         ray, anchor = _uploaded(local_ray(np.asarray(centres.numpy(), np.float64)), camera)
-    dr.eval(ray)
+    dr.eval(*ray)  # of a named tuple it would do nothing
     return ray, anchor
 
 
@@ -286,7 +286,7 @@ def _uploaded(ray: Ray, camera: Camera) -> tuple[Ray, np.ndarray]:
     anchor = 0.5 * some.min(axis=1) + 0.5 * some.max(axis=1) if valid.any() else np.zeros(3)
     parts = (np.where(valid, origin - anchor[:, None], 0.0), np.where(valid, direction, 0.0))
     origin, direction = (t.Array3f(np.ascontiguousarray(part, np.float32)) + opaque_zero() for part in parts)
-    return Ray(origin, direction, t.Bool(np.ascontiguousarray(valid))), anchor
+    return Ray(origin, direction, t.Bool(np.ascontiguousarray(valid)) & (opaque_zero() == 0)), anchor
 
 
 @functools.lru_cache(maxsize=16)

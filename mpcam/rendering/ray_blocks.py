@@ -77,7 +77,8 @@ def lens_rays(camera: Lens, scale: float) -> DeviceRays:
         used = {name: fixed[name] for name in ("x", "y")}
         used["size"] = [types().UInt([side]) for side in camera.size]
         inverse = opaque_numbers([1.0 / scale])[0]
-        rays = _frozen_image_rays(kind)(fixed["threads"][0], used, camera.ray, inverse, _room(kind, "Rays", layout, 0))
+        given = tuple(camera.ray)  # frozen kernels do not look into named tuples
+        rays = _frozen_image_rays(kind)(fixed["threads"][0], used, given, inverse, _room(kind, "Rays", layout, 0))
         blocks = bounded(kind, rays, layout)
         known = camera.kept[key] = DeviceRays(layout, kind, camera.anchor, blocks, lambda: camera.ray)
     return known
@@ -183,13 +184,12 @@ def _frozen_image_rays(kind: str) -> Any:
         x, y = _at(fixed["x"], block) + column, _at(fixed["y"], block) + row
         exists = (x < width) & (y < height)
         pixel = y * width + x
-        direction = dr.gather(t.Array3f, given.direction, pixel, exists)
-        valid = exists & dr.gather(t.Bool, given.valid, pixel, exists)
+        origin, direction, valid = given
+        direction = dr.gather(t.Array3f, direction, pixel, exists)
+        valid = exists & dr.gather(t.Bool, valid, pixel, exists)
         valid &= dr.isfinite(direction.x + direction.y + direction.z) & (dr.squared_norm(direction) > 0)
-        origin = t.Array3f(0)
-        if kind != "central":
-            origin = dr.gather(t.Array3f, given.origin, pixel, exists) * inverse
-            valid &= dr.isfinite(origin.x + origin.y + origin.z)
+        origin = t.Array3f(0) if kind == "central" else dr.gather(t.Array3f, origin, pixel, exists) * inverse
+        valid &= dr.isfinite(origin.x + origin.y + origin.z)
         direction, origin = dr.select(valid, direction, 0), dr.select(valid, origin, 0)
         target.store(family.packed(t, direction, origin), slot)
         return family.Rays(target)
