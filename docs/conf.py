@@ -41,7 +41,7 @@ myst_substitutions = {
     "block": f"{samples.WIDTH} × {samples.HEIGHT}",
     "part": str(samples.PART),
     "parts": str(samples.PARTS),
-    "per_lane": str(pixels.PER_LANE),
+    "per_thread": str(pixels.PER_THREAD),
     "pairs": f"{pipeline.PAIRS:,}",
     "per_block": str(pipeline.PER_BLOCK),
     "llvm_oldest": str(llvm.OLDEST_USABLE),
