@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from mpcam.cameras import Ray as Ray
     from mpcam.cameras import UnifiedOmni as UnifiedOmni
     from mpcam.cameras import custom_profile as custom_profile
-    from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
     from mpcam.decomposition.chained import Chained as Chained
@@ -48,14 +47,9 @@ if TYPE_CHECKING:
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
     from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
-    from mpcam.geometry.builtin import builtin_scene as builtin_scene
     from mpcam.geometry.load import load_mesh as load_mesh
     from mpcam.geometry.mesh import Material as Material
     from mpcam.geometry.mesh import Mesh as Mesh
-    from mpcam.geometry.mirror import Mirror as Mirror
-    from mpcam.geometry.scene import DirectionalLight as DirectionalLight
-    from mpcam.geometry.scene import PointLight as PointLight
-    from mpcam.geometry.scene import Scene as Scene
     from mpcam.geometry.surfaces import Surface as Surface
     from mpcam.io.calibration import read_calibration as read_calibration
     from mpcam.io.calibration import write_calibration as write_calibration
@@ -64,6 +58,7 @@ if TYPE_CHECKING:
     from mpcam.io.images import read_image as read_image
     from mpcam.io.images import write_image as write_image
     from mpcam.io.scenes import load_scene as load_scene
+    from mpcam.math.pose import look_at as look_at
     from mpcam.rendering.explain import Explanation as Explanation
     from mpcam.rendering.explain import explain as explain
     from mpcam.rendering.hits import Hits as Hits
@@ -76,13 +71,18 @@ if TYPE_CHECKING:
     from mpcam.rendering.methods import rasterize as rasterize
     from mpcam.rendering.methods import render as render
     from mpcam.rendering.shade import shade as shade
+    from mpcam.scene.builtin import builtin_scene as builtin_scene
+    from mpcam.scene.mirror import Mirror as Mirror
+    from mpcam.scene.scene import DirectionalLight as DirectionalLight
+    from mpcam.scene.scene import PointLight as PointLight
+    from mpcam.scene.scene import Scene as Scene
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
         "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection "
-        "Radial Ray UnifiedOmni custom_profile look_at"
+        "Radial Ray UnifiedOmni custom_profile"
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
@@ -98,15 +98,17 @@ _HOMES = {
     "mpcam.effects.shadows": "ShadowMap shadow_map",
     "mpcam.effects.visualization": "Unrolled surround unrolled",
     "mpcam.errors": "InputError SetupError",
-    "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
+    "mpcam.geometry.builtin": "builtin_mesh",
+    "mpcam.scene.builtin": "builtin_scene",
     "mpcam.geometry.load": "load_mesh",
     "mpcam.geometry.mesh": "Material Mesh",
-    "mpcam.geometry.mirror": "Mirror",
-    "mpcam.geometry.scene": "DirectionalLight PointLight Scene",
+    "mpcam.scene.mirror": "Mirror",
+    "mpcam.scene.scene": "DirectionalLight PointLight Scene",
     "mpcam.geometry.surfaces": "Surface",
     "mpcam.io.calibration": "read_calibration write_calibration",
     "mpcam.io.images": "read_camera read_channels read_image write_image",
     "mpcam.io.scenes": "load_scene",
+    "mpcam.math.pose": "look_at",
     "mpcam.rendering.explain": "Explanation explain",
     "mpcam.rendering.hits": "Hits",
     "mpcam.rendering.interpolate": "interpolate",
@@ -124,6 +126,7 @@ _SUBPACKAGES = (
     "io",
     "math",
     "rendering",
+    "scene",
     "stress",
     "truth",
 )

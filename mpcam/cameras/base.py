@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mpcam.cameras.capabilities import Bounds, HasRays, Projects, need
-from mpcam.cameras.pose import as_pose, frame_origin
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
+from mpcam.math.pose import as_pose, frame_origin
 
 
 def _quiet() -> np.errstate:

@@ -55,9 +55,9 @@ def compare(
     `InputError` for a scene without camera or triangles, unknown methods or settings, and an unusable output folder.
     """
     from mpcam.comparison.output import check_output
-    from mpcam.geometry.scene import Scene
     from mpcam.rendering.methods import prepare, rasterize
     from mpcam.rendering.shade import shade
+    from mpcam.scene.scene import Scene
 
     scene = Scene.of(scene)
     camera = scene.camera if camera is None else camera

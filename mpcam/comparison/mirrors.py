@@ -13,7 +13,7 @@ from mpcam.comparison.table import Row
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.effects.reflection import METHODS, Reflection
 from mpcam.errors import InputError
-from mpcam.geometry.scene import Scene
+from mpcam.scene.scene import Scene
 
 TRIANGLES = (26, 52, 104, 208, 416, 1664)
 SIZES = (64, 256, 1024)

@@ -87,7 +87,7 @@ def magma(values: np.ndarray) -> np.ndarray:
     """Values (H, W) in [0, 1] in the colours that FLIP is shown in, black to white, as linear RGB."""
     import matplotlib
 
-    from mpcam.io.srgb import linear_from_srgb
+    from mpcam.math.srgb import linear_from_srgb
 
     colors = matplotlib.colormaps["magma"](np.clip(values, 0.0, 1.0))[..., :3]
     black = np.asarray(values)[..., None] <= 0.0  # the map starts at a dark violet; no error shall look like none

@@ -24,13 +24,13 @@ from mpcam.effects.caustic_photons import Photons, photons, pixel_solid_angles, 
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh, shown
-from mpcam.geometry.scene import PointLight, Scene
 from mpcam.geometry.surfaces import Surface
 from mpcam.rendering.device import DeviceMesh, lens, opaque_numbers, opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade
+from mpcam.scene.scene import PointLight, Scene
 
 CHUNK = 1 << 22
 """Points that flux is dropped at, at a time."""

@@ -10,9 +10,9 @@ from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
 from mpcam.effects.vectors import as_vector, as_vectors
 from mpcam.errors import InputError
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.device import opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
+from mpcam.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras.pose import look_at
 from mpcam.cameras.radial import Radial
 from mpcam.errors import InputError
 from mpcam.math import atan
+from mpcam.math.pose import look_at
 from mpcam.rendering.device import types
 
 RIM = 2

@@ -14,9 +14,9 @@ from mpcam.effects.lookup import LEAST
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.device import lens, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
+from mpcam.scene.scene import Scene
 
 WEIGHTS = {"cosine": "cosine_sphere", "uniform": "equisolid"}
 OFFSET = 1e-5  # of half the longest side of the mesh: some thirty times what float32 loses

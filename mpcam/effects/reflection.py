@@ -17,14 +17,14 @@ from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, By
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.mirror import Mirror
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.device import opaque_numbers, opaque_zero, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.explain import Explanation, Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import check_shading, check_shadows, shade_device
+from mpcam.scene.mirror import Mirror
+from mpcam.scene.scene import Scene
 
 SETTINGS: dict[str, tuple[str, ...]] = {
     "camera_triangles": ("triangles", "resolution", "cams"),

@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.orthographic import Orthographic
-from mpcam.cameras.pose import look_at
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, pixels_per_radius, place, texel_direction
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import DirectionalLight, Light, PointLight, Scene
+from mpcam.math.pose import look_at
 from mpcam.rendering.device import opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.shade import check_shadow_shading
+from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
 
 SLACK, SLACK_WITHOUT_NORMALS = 1.0, 3.0  # widths of a texel
 MARGIN = 2  # texels around what an orthographic map shows

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.pose import as_pose
 from mpcam.effects.vectors import as_vector
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import shown
-from mpcam.geometry.scene import DirectionalLight, Scene
+from mpcam.math.pose import as_pose
 from mpcam.rendering.device import types
 from mpcam.rendering.exclusive import exclusive
+from mpcam.scene.scene import DirectionalLight, Scene
 
 MOST = 1_000
 """Columns or rows at most."""

@@ -23,7 +23,7 @@ from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.hou2006_fig6_pages import error_plot, gallery, quality_table, slope_table, time_plot
 from mpcam.experiments.hou2006_scenes import SHAPES, reflection_scene, smaller
 from mpcam.experiments.results import Report
-from mpcam.geometry.scene import Scene
+from mpcam.scene.scene import Scene
 
 ROUNDS = 7
 SIZES = (64, 128, 256, 512, 1024)

@@ -7,7 +7,7 @@ import numpy as np
 from mpcam.comparison.metrics import flip_map
 from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Table
-from mpcam.io.srgb import linear_from_srgb
+from mpcam.math.srgb import linear_from_srgb
 
 if TYPE_CHECKING:
     from mpcam.experiments.hou2006_fig6 import Shown

@@ -16,8 +16,8 @@ from mpcam.experiments.common import RENDERED, WARMUP, WRONG, machine, measured,
 from mpcam.experiments.hou2006_scenes import caustics_scene, light_of, reflection_scene, refraction_scene, smaller
 from mpcam.experiments.hou2006_table1_pages import gallery, overdraw_plot, overdraw_table, times_plot, times_table
 from mpcam.experiments.results import Report
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.methods import prepare
+from mpcam.scene.scene import Scene
 
 BOUNDS = ("tight", "nine_point", "triangle")
 ROUNDS = 11

@@ -13,9 +13,9 @@ from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.inner_loop import measure_loop
 from mpcam.experiments.moving_scene import wavy_sphere
 from mpcam.experiments.results import Column, Report, Table
-from mpcam.geometry.builtin import builtin_scene
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.invert import Inverted
+from mpcam.scene.builtin import builtin_scene
+from mpcam.scene.scene import Scene
 
 ROUNDS = 21
 LESS = {"triangle numbers (depth alone)": "depth", "depths too (coverage alone)": "coverage"}

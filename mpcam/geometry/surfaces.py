@@ -101,7 +101,7 @@ class Surface:
 
     def transformed(self, matrix: Any) -> "Surface":
         """The surface after a rigid 4x4 matrix (world from world). Raises InputError for other matrices."""
-        from mpcam.cameras.pose import as_pose
+        from mpcam.math.pose import as_pose
 
         return dataclasses.replace(self, world_from_surface=as_pose(matrix) @ self.world_from_surface)
 

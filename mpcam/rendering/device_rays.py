@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.pose import frame_origin
 from mpcam.math import normalize
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.device import DeviceMesh, opaque_numbers, types
 from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import View

@@ -7,8 +7,8 @@ import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.exclusive import exclusive
+from mpcam.scene.scene import Scene
 
 OUTPUTS = ("hits", "depth", "coverage")
 

@@ -8,10 +8,10 @@ import numpy as np
 from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.maps import OUTPUTS
 from mpcam.rendering.shade import shade
+from mpcam.scene.scene import Scene
 
 METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
 

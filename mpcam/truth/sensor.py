@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.pose import frame_origin
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.errors import InputError
+from mpcam.math.pose import frame_origin
 
 _registered: set[str] = set()
 _kept: dict[str, Camera] = {}

@@ -8,7 +8,7 @@ import numpy as np
 
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh, shown
-from mpcam.geometry.mirror import Mirror
+from mpcam.scene.mirror import Mirror
 
 Vector = tuple[float, float, float]
 
