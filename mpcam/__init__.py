@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from mpcam.rendering.explain import Explanation as Explanation
     from mpcam.rendering.explain import explain as explain
     from mpcam.rendering.hits import Hits as Hits
-    from mpcam.rendering.interpolate import interpolate as interpolate
+    from mpcam.rendering.hits import interpolate as interpolate
     from mpcam.rendering.maps import CoverageMap as CoverageMap
     from mpcam.rendering.maps import DepthMap as DepthMap
     from mpcam.rendering.maps import coverage_map as coverage_map
@@ -110,8 +110,7 @@ _HOMES = {
     "mpcam.io.scenes": "load_scene",
     "mpcam.math.pose": "look_at",
     "mpcam.rendering.explain": "Explanation explain",
-    "mpcam.rendering.hits": "Hits",
-    "mpcam.rendering.interpolate": "interpolate",
+    "mpcam.rendering.hits": "Hits interpolate",
     "mpcam.rendering.maps": "CoverageMap DepthMap coverage_map depth_map",
     "mpcam.rendering.methods": "prepare rasterize render",
     "mpcam.rendering.shade": "shade",

@@ -87,7 +87,7 @@ class Reflector:
     def _traced(self, origin: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
         import drjit as dr
 
-        from mpcam.rendering.exclusive import exclusive
+        from mpcam.backend import exclusive
         from mpcam.truth.variant import mitsuba
 
         @exclusive

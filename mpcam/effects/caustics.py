@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.chained import Chained
@@ -25,8 +26,8 @@ from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh, shown
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.device import DeviceMesh, lens, opaque_numbers, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device import DeviceMesh
+from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade
@@ -194,7 +195,7 @@ class Caustics:
     def _surface(self) -> dict[str, Any]:
         """What photons need to know of the eye's pixels."""
         device, pose = self._atlas, self._atlas.device.pose(self.camera)
-        seen = self.hits.device_triangle, self.hits.device_depth, lens(self.camera).ray.direction
+        seen = self.hits.device_triangle, self.hits.device_depth, device_camera(self.camera).ray.direction
         return kernels.surface()(seen, self._angles, pose, self._rays, device.vertices, device.faces, self._table)
 
     @functools.cached_property
@@ -207,7 +208,7 @@ class Caustics:
 
         t, size = types(), self.photons.camera.width
         width, height = self.camera.width, self.camera.height
-        eye, pose = lens(self.camera).on_device, self._atlas.device.pose(self.camera)
+        eye, pose = device_camera(self.camera).on_device, self._atlas.device.pose(self.camera)
         many, flux, unit, surface = 2 * (size - 1) ** 2, self._rays["flux"], self._rays["unit"], self._surface
         model = (type(self.camera), tuple(getattr(self.camera, name) for name in self.camera.static_fields))
         plan = kernels.plan(size, width, height, model)

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
 from mpcam.effects.vectors import as_vector, as_vectors
 from mpcam.errors import InputError
-from mpcam.rendering.device import opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.scene.scene import Scene
 
 

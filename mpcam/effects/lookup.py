@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import types
 from mpcam.cameras.radial import Radial
 from mpcam.errors import InputError
 from mpcam.math import atan
 from mpcam.math.pose import look_at
-from mpcam.rendering.device import types
 
 RIM = 2
 LEAST, MOST = 8, 16384  # pixels along a side

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from mpcam.backend import opaque_numbers, opaque_zero, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.reflector import reflector_of
@@ -12,7 +13,6 @@ from mpcam.decomposition.resolve import Resolver
 from mpcam.effects.environment import DeviceEnvironment
 from mpcam.effects.lookup import back_to_back
 from mpcam.effects.virtual_vertices import VirtualVertices
-from mpcam.rendering.device import opaque_numbers, opaque_zero, types
 from mpcam.rendering.methods import prepare
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import LEAST
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.device import lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device_camera import device_camera
 from mpcam.scene.scene import Scene
 
 WEIGHTS = {"cosine": "cosine_sphere", "uniform": "equisolid"}
@@ -95,7 +95,7 @@ def _covered(camera: Radial, mesh: Mesh, eyes: np.ndarray, normals: np.ndarray) 
         seen = dr.select(prepared.frame().device_mask, t.UInt(1), 0)
         dr.scatter_reduce(dr.ReduceOp.Add, totals, seen, dr.opaque(t.UInt, number))
         dr.eval(totals)
-    valid: Any = dr.count(lens(camera).ray.valid)
+    valid: Any = dr.count(device_camera(camera).ray.valid)
     return np.asarray(totals.numpy(), np.float64) / max(int(valid[0]), 1)
 
 

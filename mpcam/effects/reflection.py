@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.effects.lookup import check_size
@@ -17,8 +18,6 @@ from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, By
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.device import opaque_numbers, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.explain import Explanation, Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare

@@ -19,14 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.orthographic import Orthographic
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, pixels_per_radius, place, texel_direction
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math.pose import look_at
-from mpcam.rendering.device import opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.shade import check_shadow_shading
 from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
 

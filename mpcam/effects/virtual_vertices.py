@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras import three_rays
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
@@ -20,9 +21,8 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
 from mpcam.rendering.bundled import levels
-from mpcam.rendering.device import opaque_zero, placed, types
+from mpcam.rendering.device import placed
 from mpcam.rendering.device_rays import corner_rays
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 
 
@@ -72,8 +72,8 @@ class VirtualVertices(VertexProjected):
         for pairs, number in met:
             keys = nearest(lanes(t, 0, number), pairs, points, self.rays, keys)
         target = dr.empty(t.Float, 4 * total)
-        lens = (self.lens.on_device, self.pose, self.unit)
-        return [pixels(every, keys, points, self.rays, self.order, target, *lens)]
+        eye = (self.device_camera.on_device, self.pose, self.unit)
+        return [pixels(every, keys, points, self.rays, self.order, target, *eye)]
 
 
 def with_directions(cams: CameraTriangles) -> CameraTriangles:

@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpcam.backend import exclusive, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.effects.vectors import as_vector
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import shown
 from mpcam.math.pose import as_pose
-from mpcam.rendering.device import types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.scene.scene import DirectionalLight, Scene
 
 MOST = 1_000
@@ -152,7 +151,7 @@ class Unrolled:
     @functools.cached_property
     @exclusive
     def _number(self) -> Any:
-        from mpcam.rendering.device import opaque_zero
+        from mpcam.backend import opaque_zero
 
         return types().UInt(self.pixel.ravel()) + types().UInt(opaque_zero())
 

@@ -7,13 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats, View
+from mpcam.rendering.device import device_mesh
+from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
 
@@ -67,7 +69,7 @@ class Buffered:
     bound: str = "tight"
     output: str = "hits"
     cull: str = "none"
-    view: Callable[[], View] | None = None
+    view: Callable[[], PosedRays] | None = None
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, test: str):
@@ -77,8 +79,8 @@ class Buffered:
         self.camera, self.mesh, self.test, self.curved = camera, mesh, test, test == "central"
         self.device = device_mesh(mesh)
         self.vertices, self.faces = self.device.vertices, self.device.faces
-        self.lens: Lens = lens(camera)
-        self.samples = self.lens.directions if self.curved else self.lens.centres
+        self.device_camera = device_camera(camera)
+        self.samples = self.device_camera.directions if self.curved else self.device_camera.centres
         self.pose = self.device.pose(camera)
         self.unit = opaque_numbers([self.device.scale])[0]
 
@@ -137,7 +139,7 @@ class Buffered:
 
         camera, model, static = None, None, ()
         if self.curved:
-            camera, model = self.lens.on_device, type(self.camera)
+            camera, model = self.device_camera.on_device, type(self.camera)
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         size = (self.camera.width, self.camera.height)
         outline = self.bound if self.curved else "straight"
@@ -163,7 +165,7 @@ class Buffered:
         if self.output == "depth":
             return DepthMap(self.camera, found[0])
         if self.output == "coverage":
-            return CoverageMap(self.camera, found[0], self.lens.ray.valid)
+            return CoverageMap(self.camera, found[0], self.device_camera.ray.valid)
         return self._hits(positions, *found)
 
     def _hits(self, positions: list[Any], small: Any, depth: Any) -> Hits:

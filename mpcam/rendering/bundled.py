@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import device_mesh, opaque_numbers, types
+from mpcam.rendering.device import device_mesh
 from mpcam.rendering.device_rays import DeviceRays
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.layout import layout
 from mpcam.rendering.maps import CoverageMap, DepthMap

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.pinhole import Pinhole
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.invert import Inverted
 
@@ -70,7 +70,7 @@ class Cubemapped:
             )
         self.camera, self.mesh, self.resolution = camera, mesh, int(resolution)
         self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
-        self.lens = lens(camera)
+        self.device_camera = device_camera(camera)
         self.unit = opaque_numbers([self.faces[0].device.scale])[0]
 
     @exclusive
@@ -98,7 +98,7 @@ class Cubemapped:
     def _hits(self, frames: list[tuple[Any, Any]]) -> Hits:
         buffers = [buffer for _, buffer in frames]
         look_up = _frozen_look_up(self.resolution, self.half)
-        ray = self.lens.ray
+        ray = self.device_camera.ray
         triangle, depth, texel = look_up(ray.direction, ray.valid, buffers, self.unit)
 
         def weights() -> tuple[Any, Any]:

@@ -1,31 +1,15 @@
-"""Meshes and cameras on the device, prepared once and kept while they are alive."""
+"""Meshes on the device, uploaded once and kept while they are alive."""
 
-import copy
-import dataclasses
-import functools
 import weakref
 from typing import Any
 
 import numpy as np
 
+from mpcam.backend import opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
-from mpcam.cameras.capabilities import HasRays, need
-from mpcam.cameras.profiles import Profile
-from mpcam.cameras.types import Ray
-from mpcam.errors import InputError, SetupError
+from mpcam.cameras.types import PosedRays, Ray
+from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.math import library
-from mpcam.rendering.hits import View
-
-
-def types() -> Any:
-    """Dr.Jit array types of the backend in force; raises SetupError with the remedy where it cannot run."""
-    from mpcam_kernels import backend
-
-    try:
-        return backend.types()
-    except backend.BackendError as error:
-        raise SetupError(str(error)) from None
 
 
 class DeviceMesh:
@@ -70,7 +54,7 @@ class DeviceMesh:
         origin, along = (np.ascontiguousarray(x.T, np.float32) for x in (origin, np.asarray(rays.direction)))
         return t.Array3f(origin), t.Array3f(along), t.Bool(np.ascontiguousarray(rays.valid))
 
-    def view(self, origin: Any, direction: Any, valid: Any) -> View:
+    def view(self, origin: Any, direction: Any, valid: Any) -> PosedRays:
         """Rays of the mesh's frame, one per pixel, as what hits were found with: in scene units, from the anchor."""
         import drjit as dr
 
@@ -78,7 +62,7 @@ class DeviceMesh:
         pose[:3, 3] = -self.anchor
         ray = Ray(origin * opaque_numbers([self.scale])[0], direction, valid)
         dr.eval(ray)
-        return View(pose, ray)
+        return PosedRays(pose, ray)
 
     def pose(self, camera: Camera) -> list[Any]:
         """Rotation (9) and shift (3) from device vertices to the camera frame in units of `scale`, opaque."""
@@ -86,23 +70,6 @@ class DeviceMesh:
         shift = (matrix[:3, :3] @ self.anchor + matrix[:3, 3]) / self.scale
         numbers = [*matrix[:3, :3].ravel(), *shift]
         return opaque_numbers(numbers)
-
-
-def opaque_numbers(numbers: list[Any]) -> list[Any]:
-    """Numbers as one-element device arrays, so that kernels do not change when they do."""
-    import drjit as dr
-
-    t = types()
-    table = t.Float(np.array(numbers, np.float32))
-    values = [dr.gather(t.Float, table, t.UInt(i)) for i in range(len(numbers))]
-    dr.eval(values)
-    return values
-
-
-@functools.cache
-def opaque_zero() -> Any:
-    """Zero on the device, which no compiler can leave out."""
-    return opaque_numbers([0.0])[0]
 
 
 _meshes: weakref.WeakKeyDictionary[Mesh, DeviceMesh] = weakref.WeakKeyDictionary()
@@ -119,114 +86,6 @@ def device_mesh(mesh: Mesh) -> DeviceMesh:
         found = DeviceMesh(mesh)
         _meshes[mesh] = found
     return found
-
-
-def lens_key(camera: Camera) -> tuple[Any, ...]:
-    """What decides a camera's rays in its own frame: everything but the pose."""
-    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
-    values = ((name, getattr(camera, name)) for name in names if name != "camera_from_world")
-    return (type(camera), *(_plain(v) for _, v in values))
-
-
-def _plain(value: Any) -> Any:
-    """Numbers of any library, tables and tuples of them in a hashable form, the same for the same ones."""
-    if isinstance(value, tuple):
-        return tuple(_plain(v) for v in value)
-    if value is None or isinstance(value, (str, int, Profile)):
-        return value
-    if np.ndim(value) > 0:
-        table = np.asarray(value)
-        return table.shape, table.dtype.str, table.tobytes()
-    return float(value)
-
-
-def device_lens(camera: Camera) -> Camera:
-    """The camera at the identity pose with its numbers on the device, for use inside of kernels."""
-    lens = copy.copy(camera)
-    object.__setattr__(lens, "camera_from_world", None)
-    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
-    values = {n: getattr(camera, n) for n in names if n not in (*camera.static_fields, "camera_from_world")}
-    numbers = [float(v) for value in values.values() for v in (value if isinstance(value, tuple) else (value,))]
-    on_device = iter(opaque_numbers(numbers))
-    for name, value in values.items():
-        several = isinstance(value, tuple)
-        object.__setattr__(lens, name, tuple(next(on_device) for _ in value) if several else next(on_device))
-    return lens
-
-
-def _check_profile(profile: Any) -> None:
-    """See that a user's profile runs on Dr.Jit arrays: inside a kernel's recording it is too late to say so."""
-    if not isinstance(profile, Profile):
-        return
-    theta, problem = types().Float([0.1, 0.2]), ""
-    for name in ("radius", "slope", "angle"):
-        try:
-            result = getattr(profile, name)(theta)
-        except (TypeError, ValueError, AttributeError, RuntimeError) as error:
-            problem = f"{name} fails: {error}"
-        else:
-            problem = problem or ("" if library(result) == "drjit" else f"{name} gives a {type(result).__name__}")
-        if problem:
-            text = " ".join(problem.split())
-            raise InputError(
-                f"profile {profile.name!r} does not run on Dr.Jit arrays ({text}): use mpcam.math functions"
-            )
-
-
-class Lens:
-    """Rays and kernels' view of a camera, which hold for every pose of it."""
-
-    def __init__(self, camera: Camera):
-        import drjit as dr
-
-        from mpcam_kernels import samples
-
-        _check_profile(getattr(camera, "profile", None))
-        alike = camera.ray_geometry != "general"  # others keep their tables, which kernels read in a form of their own
-        self.on_device, self.size = device_lens(camera) if alike else camera, (camera.width, camera.height)
-        self.ray = need(self.on_device, HasRays, "a frame").local_ray(
-            samples.pixel_centres(types(), camera.width, camera.height)
-        )
-        dr.eval(self.ray)
-
-    @functools.cached_property
-    def directions(self) -> Any:
-        """Samples of a central camera."""
-        from mpcam_kernels import samples
-
-        return samples.central_samples(types(), self.ray.direction, self.ray.valid, *self.size)
-
-    @functools.cached_property
-    def centres(self) -> Any:
-        """Samples of the image plane, for straight-edged triangles."""
-        from mpcam_kernels import samples
-
-        return samples.planar_samples(types(), self.ray.valid, *self.size)
-
-
-@functools.lru_cache(maxsize=16)
-def _lens(key: tuple[Any, ...], backend: str, holder: "_Held") -> Lens:
-    return Lens(holder.camera)
-
-
-class _Held:
-    """Carries a camera past the cache's key: all holders are equal."""
-
-    def __init__(self, camera: Camera):
-        self.camera = camera
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held)
-
-    def __hash__(self) -> int:
-        return 0
-
-
-def lens(camera: Camera) -> Lens:
-    """Rays of a camera's pixels on the device; the sixteen used last are kept."""
-    from mpcam_kernels.backend import backend_name
-
-    return _lens(lens_key(camera), backend_name(), _Held(camera))
 
 
 def to_camera(pose: list[Any], vertices: Any, count: Any) -> Any:

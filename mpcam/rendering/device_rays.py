@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.types import PosedRays
 from mpcam.math import normalize
 from mpcam.math.pose import frame_origin
-from mpcam.rendering.device import DeviceMesh, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import View
+from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.layout import Layout, layout
 
 
@@ -45,7 +45,7 @@ class DeviceRays:
 
     @functools.cached_property
     @exclusive
-    def view(self) -> View:
+    def view(self) -> PosedRays:
         """The rays in scene units, in world axes from the mesh's anchor."""
         return self.device.view(*self.in_rows())
 

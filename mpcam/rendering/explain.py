@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import attributes, check_shading
 from mpcam.scene.scene import PointLight, Scene

@@ -3,11 +3,12 @@
 import functools
 from typing import Any
 
+from mpcam.backend import types
 from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import to_camera, types
+from mpcam.rendering.device import to_camera
 from mpcam.rendering.outlines import ROWS
 
 BOUNDS = ("tight", "triangle", "quad")
@@ -50,7 +51,7 @@ class Inverted(Buffered):
         model = type(self.camera)
         static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         place = _frozen_place(self.curved, model, static if self.curved else (), rows)
-        return place(number, targets, self.lens.on_device, self.pose, self.unit, vertices)
+        return place(number, targets, self.device_camera.on_device, self.pose, self.unit, vertices)
 
 
 @functools.lru_cache(maxsize=64)

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.exclusive import exclusive
 from mpcam.scene.scene import Scene
 
 OUTPUTS = ("hits", "depth", "coverage")

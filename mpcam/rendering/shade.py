@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math.pose import frame_origin
-from mpcam.rendering.device import opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.hits import Hits
 from mpcam.scene.scene import DirectionalLight, PointLight, Scene
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, types
 from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import to_camera, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device import to_camera
 
 MOST_LEVELS = 7
 MOST_TRIANGLES = 1 << 26
@@ -52,7 +52,7 @@ class VertexProjected(Buffered):
         number = lanes(types(), 0, points)
         target = dr.empty(types().Float, 4 * points)
         place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
-        data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)
+        data = (self.device_camera.on_device, self.pose, self.unit, vertices, self.corners)
         return [place(number, target, self.parts.grid, *data)]
 
     def parent(self, triangle: Any) -> Any:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.bundled import BOUNDS, Bundled
-from mpcam.rendering.device import types
 from mpcam.stress.report import Case
 
 SIDE, FACES, TRIANGLES = 20, 10, 2000

@@ -4,14 +4,15 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.types import Ray
+from mpcam.cameras.types import PosedRays, Ray
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats, View
+from mpcam.rendering.device import DeviceMesh, device_mesh
+from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.hits import Hits, Stats
 from mpcam.truth.meshes import mitsuba_mesh, move, position_key
 from mpcam.truth.variant import mitsuba
 
@@ -22,7 +23,7 @@ def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
         from mpcam.rendering.device_rays import DeviceRays
 
         return DeviceRays(camera, device).in_rows()
-    origin, direction, valid = lens(camera).ray
+    origin, direction, valid = device_camera(camera).ray
     pose, scale = device.pose(camera), 1.0 / device.scale
     moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
     columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
@@ -115,7 +116,7 @@ class RayTraced:
             None if self.own_rays else self._view,
         )
 
-    def _view(self) -> View:
+    def _view(self) -> PosedRays:
         t = types()
         origin, direction = (t.Array3f(*(t.Float(x) for x in part)) for part in (self._ray.o, self._ray.d))
         return self.device.view(origin, direction, t.Bool(self._valid))

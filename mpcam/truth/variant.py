@@ -15,7 +15,7 @@ def mitsuba() -> Iterator[Any]:
     """
     import mitsuba as mi
 
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
     from mpcam_kernels.backend import backend_name
 
     types()  # checks LLVM before anything is compiled
