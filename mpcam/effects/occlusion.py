@@ -16,6 +16,7 @@ from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.methods import prepare
 from mpcam.scene.scene import Scene
 
 WEIGHTS = {"cosine": "cosine_sphere", "uniform": "equisolid"}
@@ -81,8 +82,6 @@ def _covered(camera: Radial, mesh: Mesh, eyes: np.ndarray, normals: np.ndarray) 
     One prepared camera is moved: of what it keeps, only the pose changes. Counts stay on the device until the last.
     """
     import drjit as dr
-
-    from mpcam.rendering.methods import prepare
 
     t = types()
     prepared: Any = prepare(camera, mesh, output="coverage")

@@ -2,19 +2,21 @@
 
 import functools
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.outline import HIDDEN
 from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import device_mesh
 from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
@@ -158,6 +160,47 @@ class Buffered:
         self._decoded(*self.buffer(clock))
         clock.done("decode")
         return clock.seconds
+
+    @exclusive
+    def explain(self) -> tuple[Step, ...]:
+        """Which stages a frame takes, which are left out, and why; takes one frame to find out."""
+        return tuple(self._steps())
+
+    def _steps(self) -> Iterator[Step]:
+        seen: dict[str, Any] = {}
+        positions = self.place(self.vertices) if self.mesh.triangle_count else []
+        if not positions:
+            yield Step("rasterization", False, "the mesh has no triangles")
+            return
+        self.run(positions, seen.__setitem__)
+        vertices, triangles = len(positions[0].numpy()) // 4, self.triangle_count
+        yield Step("vertices", True, f"{vertices:,} brought to the camera")
+        outlined = self.curved and len(positions) > 1
+        lens = f"{vertices:,}: what each knows of the projection, so that triangles need no profile"
+        why = lens if outlined else f"the bound {self.bound!r} is worked out triangle by triangle"
+        yield Step("projection around vertices", outlined, why if self.curved else "edges are straight in the image")
+        hidden = self._hidden(positions) if outlined else 0
+        culled = "" if self.cull == "none" else f", and those that show their {self.cull}"
+        yield Step(
+            "triangles", True, f"{triangles - hidden:,} bounded; left out: {hidden:,} that no pixel can see{culled}"
+        )
+        large = int(seen["triangles"][1].count[0])
+        few = f"{large:,} of more pixels than a lane walks by itself"
+        yield Step(
+            "lists of blocks", "lists" in seen, few if large else "no triangle covers more than a lane walks by itself"
+        )
+        yield Step("pixels through lists", "pixels" in seen, "nearest of each list" if large else "there are no lists")
+        wanted = {"hits": "triangle and depth", "depth": "depth alone", "coverage": "coverage alone"}[self.output]
+        yield Step("decode", True, f"{wanted} of each pixel")
+        yield Step(
+            "root finding", False, "a pixel's ray is known in closed form or kept per camera, and is met by a plane"
+        )
+        yield Step("tree over the triangles", False, "only method='raytrace' needs one")
+
+    def _hidden(self, positions: list[Any]) -> int:
+        """Triangles whose corners all lie in the convex region that no pixel sees."""
+        place = np.asarray(positions[0].numpy()).reshape(-1, 4)[:, 3]
+        return int((place[self.mesh.faces] >= HIDDEN).all(axis=1).sum())
 
     def _decoded(self, positions: list[Any], keys: Any) -> Any:
         unit = self.unit if self.curved else opaque_one()

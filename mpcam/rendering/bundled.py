@@ -15,6 +15,7 @@ from mpcam.geometry.order import nearby
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import device_mesh
 from mpcam.rendering.device_rays import DeviceRays
+from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.layout import layout
 from mpcam.rendering.maps import CoverageMap, DepthMap
@@ -100,6 +101,10 @@ class Bundled:
         self._decoded(keys)
         clock.done("decode")
         return clock.seconds
+
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))
 
     def _decoded(self, keys: Any) -> Any:
         place = self.rays.place

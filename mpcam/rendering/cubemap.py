@@ -13,6 +13,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.invert import Inverted
 
@@ -94,6 +95,10 @@ class Cubemapped:
         self._hits(frames)
         clock.done("resample")
         return clock.seconds
+
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))
 
     def _hits(self, frames: list[tuple[Any, Any]]) -> Hits:
         buffers = [buffer for _, buffer in frames]

@@ -12,9 +12,10 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh
 from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
-from mpcam.truth.meshes import mitsuba_mesh, move, position_key
-from mpcam.truth.variant import mitsuba
+from mpcam.tracing.meshes import mitsuba_mesh, move, position_key
+from mpcam.tracing.variant import mitsuba
 
 
 def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
@@ -134,3 +135,7 @@ class RayTraced:
         self.frame()
         clock.done("trace")
         return clock.seconds
+
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))
