@@ -9,7 +9,7 @@ import pytest
 import mpcam
 import mpcam.comparison
 from mpcam.cameras import Orthographic, Radial
-from mpcam.comparison.driver import moving_vertices
+from mpcam.comparison.motion import moving_vertices
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Material, Mesh
 from mpcam.math.pose import look_at

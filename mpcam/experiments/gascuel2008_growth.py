@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mpcam.comparison import timing
-from mpcam.comparison.driver import moving_frame, moving_vertices
+from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.experiments.common import CARD, PAPER, STAND_IN, WARMUP, machine, measured, rounds
 from mpcam.experiments.figures import plain_ticks
