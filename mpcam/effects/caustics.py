@@ -16,6 +16,7 @@ import numpy as np
 from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
@@ -24,7 +25,7 @@ from mpcam.effects import caustic_kernels as kernels
 from mpcam.effects.caustic_photons import Photons, photons, pixel_solid_angles, solid_angle
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.device_camera import device_camera
@@ -394,9 +395,8 @@ def caustics(
     whole = Scene.of(scene)
     if not isinstance(light, PointLight):
         raise InputError(f"caustics: light is a {type(light).__name__}: give a PointLight")
-    if isinstance(photons, bool) or not isinstance(photons, (int, np.integer)) or not 2 <= photons <= 4096:
-        raise InputError(f"caustics(photons={shown(photons)}): give a whole number from 2 to 4096")
-    if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 <= radius <= 8:
+    photons = whole_number("photons", photons, 2, 4096, of="caustics")
+    if not is_number(radius) or not 0 <= radius <= 8:
         raise InputError(f"caustics(radius={shown(radius)}): give pixels from 0 to 8")
     if back is not None and index is None:
         raise InputError(
@@ -414,7 +414,7 @@ def caustics(
     settings = Settings(
         triangles=triangles,
         resolution=resolution,
-        photons=int(photons),
+        photons=photons,
         radius=float(radius),
         index=index,
         back=back,

@@ -11,6 +11,7 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.radial import Radial
+from mpcam.checks import is_number, whole_number
 from mpcam.effects.lookup import LEAST
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
@@ -48,7 +49,7 @@ def form_factor(
         return np.zeros(eyes.shape[:-1])
     if offset is None:
         offset = OFFSET * 0.5 * float((whole.bounds[1] - whole.bounds[0]).max())
-    elif isinstance(offset, bool) or not isinstance(offset, (int, float, np.number)) or not np.isfinite(offset):
+    elif not is_number(offset):
         raise InputError(f"offset={offset!r}: a finite length in scene units is needed")
     centre = [0.5 * size + shift for shift in CENTRE]
     camera = Radial(size, size, kind, radius=0.5 * size - 0.5, cx=centre[0], cy=centre[1])
@@ -70,9 +71,7 @@ def ambient_occlusion(
 def _check_view(size: Any, weight: Any) -> tuple[int, str]:
     if weight not in WEIGHTS:
         raise InputError(f"weight={weight!r}: allowed are {', '.join(WEIGHTS)}")
-    if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or not LEAST <= size <= MOST:
-        raise InputError(f"size={size!r}: a whole number of pixels from {LEAST} to {MOST} is needed")
-    return int(size), WEIGHTS[weight]
+    return whole_number("size", size, LEAST, MOST, unit="pixels"), WEIGHTS[weight]
 
 
 @exclusive

@@ -3,8 +3,9 @@
 from importlib import import_module
 from typing import NamedTuple
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 
 
 class _Recipe(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.pinhole import Pinhole
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
@@ -56,12 +57,7 @@ class Cubemapped:
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
-        if (
-            isinstance(resolution, bool)
-            or not isinstance(resolution, (int, np.integer))
-            or not 1 <= resolution <= 16384
-        ):
-            raise InputError(f"resolution={resolution!r}: a whole number of pixels from 1 to 16384 is needed")
+        resolution = whole_number("resolution", resolution, 1, 16384, unit="pixels")
         angle = camera.domain.max_angle
         if camera.ray_geometry != "central" or angle is None:
             raise InputError(f"method={self.method!r} needs a camera with one centre, not {type(camera).__name__}")
@@ -69,7 +65,7 @@ class Cubemapped:
             raise InputError(
                 f"method='hemicube' sees 180 degrees, the camera {np.degrees(2 * angle):.0f}: use method='cubemap'"
             )
-        self.camera, self.mesh, self.resolution = camera, mesh, int(resolution)
+        self.camera, self.mesh, self.resolution = camera, mesh, resolution
         self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
         self.device_camera = device_camera(camera)
         self.unit = opaque_numbers([self.faces[0].device.scale])[0]

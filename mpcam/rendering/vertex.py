@@ -7,6 +7,7 @@ import numpy as np
 
 from mpcam.backend import exclusive, types
 from mpcam.cameras.base import Camera
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
@@ -28,17 +29,14 @@ class VertexProjected(Buffered):
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, level: int = 0):
-        if isinstance(level, bool) or not isinstance(level, (int, np.integer)) or not 0 <= level <= MOST_LEVELS:
-            raise InputError(
-                f"level={level!r}: a whole number from 0 to {MOST_LEVELS} is needed (edges split 2**level times)"
-            )
+        level = whole_number("level", level, 0, MOST_LEVELS, hint="edges split 2**level times")
         total = mesh.triangle_count * 4**level
         if total > MOST_TRIANGLES:
             raise InputError(
                 f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}"
             )
         super().__init__(camera, mesh, "projected" if camera.ray_geometry == "central" else "planar")
-        self.level = int(level)
+        self.level = level
         self.parts = Parts(2**self.level)
         self.corners = self.faces  # of the whole triangles
         self.faces = self.parts.faces(self.corners, mesh.triangle_count)

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.scene.mirror import Mirror
 
 Vector = tuple[float, float, float]

@@ -14,6 +14,7 @@ from typing import Any
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.math.pose import frame_origin
 
@@ -31,8 +32,7 @@ def sensor(
     """
     if not isinstance(camera, Camera):
         raise InputError(f"sensor(camera={type(camera).__name__}): give one of mpcam's cameras")
-    if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-        raise InputError(f"sensor(samples={samples!r}): a whole number >= 1 is needed")
+    samples = whole_number("samples", samples, 1, of="sensor")
     settings = {
         "type": "hdrfilm",
         "width": camera.width,
