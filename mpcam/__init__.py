@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from mpcam.cameras import Ray as Ray
     from mpcam.cameras import UnifiedOmni as UnifiedOmni
     from mpcam.cameras import custom_profile as custom_profile
-    from mpcam.cameras import look_at as look_at
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
     from mpcam.decomposition.chained import Chained as Chained
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
     from mpcam.effects.caustics import Caustics as Caustics
     from mpcam.effects.caustics import caustics as caustics
     from mpcam.effects.environment import EnvironmentMap as EnvironmentMap
-    from mpcam.effects.environment import environment_map as environment_map
     from mpcam.effects.occlusion import ambient_occlusion as ambient_occlusion
     from mpcam.effects.occlusion import form_factor as form_factor
     from mpcam.effects.reflection import Reflection as Reflection
@@ -48,14 +46,9 @@ if TYPE_CHECKING:
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
     from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
-    from mpcam.geometry.builtin import builtin_scene as builtin_scene
     from mpcam.geometry.load import load_mesh as load_mesh
     from mpcam.geometry.mesh import Material as Material
     from mpcam.geometry.mesh import Mesh as Mesh
-    from mpcam.geometry.mirror import Mirror as Mirror
-    from mpcam.geometry.scene import DirectionalLight as DirectionalLight
-    from mpcam.geometry.scene import PointLight as PointLight
-    from mpcam.geometry.scene import Scene as Scene
     from mpcam.geometry.surfaces import Surface as Surface
     from mpcam.io.calibration import read_calibration as read_calibration
     from mpcam.io.calibration import write_calibration as write_calibration
@@ -64,25 +57,32 @@ if TYPE_CHECKING:
     from mpcam.io.images import read_image as read_image
     from mpcam.io.images import write_image as write_image
     from mpcam.io.scenes import load_scene as load_scene
-    from mpcam.rendering.explain import Explanation as Explanation
-    from mpcam.rendering.explain import explain as explain
+    from mpcam.math.pose import look_at as look_at
+    from mpcam.pictures.environment import environment_map as environment_map
+    from mpcam.pictures.explain import explain as explain
+    from mpcam.pictures.render import render as render
+    from mpcam.rendering.explanation import Explanation as Explanation
     from mpcam.rendering.hits import Hits as Hits
-    from mpcam.rendering.interpolate import interpolate as interpolate
+    from mpcam.rendering.hits import interpolate as interpolate
     from mpcam.rendering.maps import CoverageMap as CoverageMap
     from mpcam.rendering.maps import DepthMap as DepthMap
-    from mpcam.rendering.maps import coverage_map as coverage_map
-    from mpcam.rendering.maps import depth_map as depth_map
+    from mpcam.rendering.methods import coverage_map as coverage_map
+    from mpcam.rendering.methods import depth_map as depth_map
     from mpcam.rendering.methods import prepare as prepare
     from mpcam.rendering.methods import rasterize as rasterize
-    from mpcam.rendering.methods import render as render
     from mpcam.rendering.shade import shade as shade
+    from mpcam.scene.builtin import builtin_scene as builtin_scene
+    from mpcam.scene.mirror import Mirror as Mirror
+    from mpcam.scene.scene import DirectionalLight as DirectionalLight
+    from mpcam.scene.scene import PointLight as PointLight
+    from mpcam.scene.scene import Scene as Scene
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
         "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection "
-        "Radial Ray UnifiedOmni custom_profile look_at"
+        "Radial Ray UnifiedOmni custom_profile"
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
@@ -92,27 +92,31 @@ _HOMES = {
     "mpcam.decomposition.ray_error": "RayError ray_error",
     "mpcam.decomposition.resolve": "Resolver resolve",
     "mpcam.effects.caustics": "Caustics caustics",
-    "mpcam.effects.environment": "EnvironmentMap environment_map",
+    "mpcam.effects.environment": "EnvironmentMap",
     "mpcam.effects.occlusion": "ambient_occlusion form_factor",
     "mpcam.effects.reflection": "Reflection reflection",
     "mpcam.effects.shadows": "ShadowMap shadow_map",
     "mpcam.effects.visualization": "Unrolled surround unrolled",
     "mpcam.errors": "InputError SetupError",
-    "mpcam.geometry.builtin": "builtin_mesh builtin_scene",
+    "mpcam.geometry.builtin": "builtin_mesh",
     "mpcam.geometry.load": "load_mesh",
     "mpcam.geometry.mesh": "Material Mesh",
-    "mpcam.geometry.mirror": "Mirror",
-    "mpcam.geometry.scene": "DirectionalLight PointLight Scene",
     "mpcam.geometry.surfaces": "Surface",
     "mpcam.io.calibration": "read_calibration write_calibration",
     "mpcam.io.images": "read_camera read_channels read_image write_image",
     "mpcam.io.scenes": "load_scene",
-    "mpcam.rendering.explain": "Explanation explain",
-    "mpcam.rendering.hits": "Hits",
-    "mpcam.rendering.interpolate": "interpolate",
-    "mpcam.rendering.maps": "CoverageMap DepthMap coverage_map depth_map",
-    "mpcam.rendering.methods": "prepare rasterize render",
+    "mpcam.math.pose": "look_at",
+    "mpcam.pictures.environment": "environment_map",
+    "mpcam.pictures.explain": "explain",
+    "mpcam.pictures.render": "render",
+    "mpcam.rendering.explanation": "Explanation",
+    "mpcam.rendering.hits": "Hits interpolate",
+    "mpcam.rendering.maps": "CoverageMap DepthMap",
+    "mpcam.rendering.methods": "coverage_map depth_map prepare rasterize",
     "mpcam.rendering.shade": "shade",
+    "mpcam.scene.builtin": "builtin_scene",
+    "mpcam.scene.mirror": "Mirror",
+    "mpcam.scene.scene": "DirectionalLight PointLight Scene",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 _SUBPACKAGES = (
@@ -123,7 +127,9 @@ _SUBPACKAGES = (
     "geometry",
     "io",
     "math",
+    "pictures",
     "rendering",
+    "scene",
     "stress",
     "truth",
 )

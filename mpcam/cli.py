@@ -178,7 +178,7 @@ def render(
     asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull, "triangles": triangles}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     if loaded.mirror is not None:
-        from mpcam.rendering.methods import render as picture
+        from mpcam.pictures.render import render as picture
 
         with Console(stderr=True).status(f"rendering {loaded.name}"):
             texels = 1024 if shadow_size is None else shadow_size
@@ -190,7 +190,7 @@ def render(
                 write_image(output, image)
         return
     if explain:
-        from mpcam.rendering.explain import explain as explained
+        from mpcam.pictures.explain import explain as explained
 
         print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))
     with Console(stderr=True).status(f"rendering {loaded.name}"):

@@ -36,9 +36,9 @@ def decompose(
     from mpcam.cameras.serialize import camera_to_json
     from mpcam.decomposition.decompose import decompose as cut
     from mpcam.decomposition.ray_error import ray_error
-    from mpcam.geometry.mirror import Mirror
     from mpcam.io.atomic import atomic_path
     from mpcam.io.points import read_point
+    from mpcam.scene.mirror import Mirror
 
     check_machine()
     loaded = load(scene, None).scene
@@ -90,9 +90,9 @@ def caustics(
     from rich.console import Console
 
     from mpcam.effects.caustics import caustics as cast
-    from mpcam.geometry.scene import PointLight
     from mpcam.io.image_formats import format_of
     from mpcam.io.images import write_image
+    from mpcam.scene.scene import PointLight
 
     format_of(output)
     check_machine()

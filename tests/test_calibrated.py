@@ -17,7 +17,7 @@ from test_rasterize import assert_agree
 import mpcam as mp
 from mpcam.cameras.change import resized
 from mpcam.cameras.outline import outline
-from mpcam.rendering.device import device_lens
+from mpcam.rendering.device_camera import unposed
 
 TUM_VI = (0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182)
 
@@ -325,7 +325,7 @@ def test_linear_views_and_fine_meshes_come_near(model):
 def test_kernels_see_every_number():
     """Each number of a tuple reaches the device, and the derived ones do too."""
     camera = REAL["220 degrees"]
-    lens: Any = device_lens(camera)
+    lens: Any = unposed(camera)
     assert np.allclose([number.numpy()[0] for number in lens.k], camera.k, rtol=1e-6)
     assert abs(lens.limit.numpy()[0] - 1.92) < 1e-6
     assert abs(lens.edge.numpy()[0] - camera.edge) < 1e-6

@@ -13,8 +13,8 @@ from mpcam.effects import caustic_photons
 from mpcam.effects.caustics import Caustics, caustics
 from mpcam.geometry.surfaces import Surface
 from mpcam.math import PI
-from mpcam.truth.meshes import mitsuba_mesh
-from mpcam.truth.variant import mitsuba
+from mpcam.tracing.meshes import mitsuba_mesh
+from mpcam.tracing.variant import mitsuba
 
 LIGHT = mp.PointLight((0.2, -1.0, 2.5), (3.0, 2.0, 1.0))
 VIRTUAL = (0.2, 5.0, 2.5)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mpcam as mp
+from mpcam.backend import types
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
@@ -12,7 +13,6 @@ from mpcam.decomposition.reflector import reflector_of
 from mpcam.decomposition.shooting import Locator, shoot
 from mpcam.decomposition.views import seen_samples
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.device import types
 
 EYE = np.array((0.0, -5.0, 0.5))
 MIDDLE = np.array((2.5, -0.6, 0.3))

@@ -8,11 +8,12 @@ import pytest
 
 import mpcam
 import mpcam.comparison
-from mpcam.cameras import Orthographic, Radial, look_at
-from mpcam.comparison.driver import moving_vertices
+from mpcam.cameras import Orthographic, Radial
+from mpcam.comparison.motion import moving_vertices
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Material, Mesh
-from mpcam.geometry.scene import DirectionalLight, Scene
+from mpcam.math.pose import look_at
+from mpcam.scene.scene import DirectionalLight, Scene
 
 SIZE = 128
 RESOLUTIONS = (32, 64, 128)

@@ -10,10 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mpcam.comparison.columns import COLUMNS
 from mpcam.comparison.numbers import format_column, format_number, format_spread
 from mpcam.comparison.pareto import headline, is_exact, pareto_front, winner_sentence, winners
 from mpcam.comparison.plan import MAX_TRIANGLES, make_plan
-from mpcam.comparison.table import COLUMNS, Comparison, Row
+from mpcam.comparison.rows import Row
+from mpcam.comparison.table import Comparison
 from mpcam.errors import InputError
 
 

@@ -15,7 +15,7 @@ import pytest
 
 import mpcam
 from mpcam.cli import EXIT_FAILURE, EXIT_INPUT, EXIT_INTERRUPT, app
-from mpcam.comparison.table import COLUMNS
+from mpcam.comparison.columns import COLUMNS
 from mpcam.geometry.builtin import builtin_mesh
 from mpcam.io import scene_tables as tables
 from mpcam.rendering import cubemap, invert, methods, vertex

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import mpcam as mp
+from mpcam.backend import types
 from mpcam.effects.lookup import texel_direction
-from mpcam.rendering.device import types
 from mpcam_kernels.frozen import frozen
 
 CENTRE = np.array([0.3, -0.2, 0.1])

@@ -12,8 +12,8 @@ from mpcam.cli import main
 from mpcam.effects import shadows as module
 from mpcam.math import PI
 from mpcam.rendering import shade as shade_module
-from mpcam.truth.meshes import mitsuba_mesh
-from mpcam.truth.variant import mitsuba
+from mpcam.tracing.meshes import mitsuba_mesh
+from mpcam.tracing.variant import mitsuba
 
 LAMPS = {"facade": (3.0, 1.0, 3.0), "temple": (2.0, 1.0, 3.0), "characters": (0.5, 0.5, 3.0)}
 

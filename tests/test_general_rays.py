@@ -9,6 +9,7 @@ from ray_fields import Field, camera, fields, soup, wrong_pixels
 
 import mpcam as mp
 from mpcam.math import cos, isfinite, normalize, sin, vector
+from mpcam.rendering.general import GeneralRasterizer
 
 POSE = mp.look_at((0.3, 0.2, -0.4), (1.0, 0.5, 0.2))
 LARGE, SMALL = soup(150, 40, 0.8), soup(2000, 41, 0.08)
@@ -86,12 +87,11 @@ def test_arrays_of_the_device_and_of_numpy_give_the_same_frame(model):
 
 
 def test_a_common_center_is_found():
-    kinds = {
-        name: mp.prepare(camera(fields(20, 20)[name]), SMALL).rays.kind for name in ("panorama elsewhere", "folded")
-    }
+    views = {name: camera(fields(20, 20)[name]) for name in ("panorama elsewhere", "folded")}
+    kinds = {name: GeneralRasterizer(view, SMALL).rays.kind for name, view in views.items()}
     assert kinds == {"panorama elsewhere": "central", "folded": "general"}
-    assert mp.prepare(Eye(20, 20), SMALL).rays.kind == "central"
-    assert mp.prepare(Twisted(20, 20), SMALL).rays.kind == "general"
+    assert GeneralRasterizer(Eye(20, 20), SMALL).rays.kind == "central"
+    assert GeneralRasterizer(Twisted(20, 20), SMALL).rays.kind == "general"
 
 
 @pytest.mark.parametrize("model", [Twisted, Eye])
@@ -108,7 +108,7 @@ def test_sides(model):
 
 
 def test_another_pose_needs_no_other_rays():
-    prepared = mp.prepare(Twisted(64, 48, POSE), SMALL)
+    prepared = GeneralRasterizer(Twisted(64, 48, POSE), SMALL)
     rays, moved = prepared.rays.blocks, Twisted(64, 48, mp.look_at((0, 1, -2), (0, 0, 0)))
     prepared.aim(moved)
     assert prepared.rays.blocks is rays
@@ -213,3 +213,37 @@ def test_an_own_camera_is_a_pytree():
         leaves, tree = jax.tree_util.tree_flatten(model(8, 8, POSE, 0.25))
         assert len(leaves) == 2
         assert jax.tree_util.tree_unflatten(tree, leaves).twist == 0.25
+
+
+VIEWS = {
+    "invert": (mp.Radial.paraboloid(40, 30, POSE), mp.Pinhole(40, 30)),
+    "invert, parallel": (mp.Orthographic(40, 30, camera_from_world=POSE), mp.Orthographic(40, 30, 4.0)),
+    "invert, any rays": (Twisted(40, 30, POSE), Eye(30, 40)),
+    "vertex": (mp.Radial.paraboloid(40, 30, POSE), mp.Orthographic(50, 30)),
+    "cubemap": (mp.Radial.paraboloid(40, 30, POSE), mp.Pinhole(30, 30)),
+    "hemicube": (mp.Radial.paraboloid(40, 30, POSE), mp.Radial.equisolid(30, 40)),
+    "raytrace": (mp.Radial.paraboloid(40, 30, POSE), Twisted(40, 30)),
+}
+
+
+@pytest.mark.parametrize("name", list(VIEWS))
+def test_every_method_aims(name):
+    """Another camera gives what a fresh frame of it gives, to the bit."""
+    first, second = VIEWS[name]
+    method = name.partition(",")[0]
+    prepared = mp.prepare(first, LARGE, method)
+    before = prepared.frame().triangle
+    prepared.aim(second)
+    frame, fresh = prepared.frame(), mp.rasterize(second, LARGE, method)
+    assert np.array_equal(frame.triangle, fresh.triangle) and np.array_equal(frame.depth, fresh.depth)
+    assert np.array_equal(frame.barycentric, fresh.barycentric)
+    prepared.aim(first)
+    assert np.array_equal(prepared.frame().triangle, before)
+
+
+def test_what_cannot_be_aimed_says_so():
+    prepared = mp.prepare(mp.Radial.paraboloid(20, 20), LARGE)
+    with pytest.raises(mp.InputError, match="which Twisted does not have: prepare anew"):
+        prepared.aim(Twisted(20, 20))
+    with pytest.raises(mp.InputError, match="method='vertex' needs images of points"):
+        mp.rasterize(Twisted(20, 20), LARGE, "vertex")

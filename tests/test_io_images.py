@@ -9,11 +9,12 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from mpcam.cameras import Orthographic, Pinhole, Radial, look_at
+from mpcam.cameras import Orthographic, Pinhole, Radial
 from mpcam.errors import InputError
 from mpcam.io.atomic import atomic_path
 from mpcam.io.images import CAMERA_ATTRIBUTE, DEPTH_CHANNEL, read_camera, read_channels, read_image, write_image
-from mpcam.io.srgb import linear_from_srgb, srgb_from_linear
+from mpcam.math.pose import look_at
+from mpcam.math.srgb import linear_from_srgb, srgb_from_linear
 
 POSE = look_at((1.0, -2.0, 1.5), (0.25, 0.1, 0.3))
 SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-45, 3.4e38, -1.5]

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni, look_at
+from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni
 from mpcam.errors import InputError
 from mpcam.geometry.builtin import builtin_mesh
-from mpcam.geometry.scene import DirectionalLight, PointLight
 from mpcam.io.images import write_image
 from mpcam.io.scene_camera import default_camera
 from mpcam.io.scenes import CompareSettings, load_scene
+from mpcam.math.pose import look_at
+from mpcam.scene.scene import DirectionalLight, PointLight
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples" / "scenes").glob("*.toml"))
 TRIANGLE = "v 0 0 0\nv 2 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"

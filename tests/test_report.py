@@ -13,7 +13,8 @@ from mpcam.cameras import Radial
 from mpcam.comparison import output, report
 from mpcam.comparison.metrics import flip_map
 from mpcam.comparison.pareto import pareto_front
-from mpcam.comparison.table import Comparison, Row
+from mpcam.comparison.rows import Row
+from mpcam.comparison.table import Comparison
 from mpcam.errors import InputError
 from mpcam.io.images import read_camera, read_channels, read_image
 

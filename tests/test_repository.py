@@ -42,7 +42,7 @@ def text_files() -> list[Path]:
     found = []
     for folder, folders, files in os.walk(ROOT):
         folders[:] = [name for name in folders if name not in GENERATED and not name.endswith("_cache")]
-        found += [Path(folder, name) for name in files if Path(name).suffix in TEXT]
+        found += [Path(folder, name) for name in files if Path(name).suffix in TEXT and name not in GENERATED]
     return [path for path in found if path.relative_to(ROOT).parts[0] != ".hypothesis"]
 
 

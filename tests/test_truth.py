@@ -11,7 +11,7 @@ from triangle_cameras import CAMERAS, around
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_json
-from mpcam.truth.meshes import mitsuba_mesh
+from mpcam.tracing.meshes import mitsuba_mesh
 
 EYE = mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7))
 

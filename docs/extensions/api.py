@@ -40,7 +40,7 @@ def process_signature(
 
 def _called_by_users(kind: Any) -> bool:
     """Whether users make objects of a class themselves: those that methods return, they only read."""
-    made_here = {"Ray", "Projection", "Box", "Domain", "Hits", "Comparison", "Camera", "Row", "Stats", "Column"}
+    made_here = {"Ray", "Projection", "Box", "Domain", "Hits", "Comparison", "Camera", "Row", "Stats", "Quantity"}
     made_here |= {"DepthMap", "CoverageMap", "ShadowMap", "PointShadow", "DirectionalShadow", "DeviceEnvironment"}
     made_here |= {"Explanation", "Step"}
     return getattr(kind, "__name__", "") not in made_here and inspect.isclass(kind)

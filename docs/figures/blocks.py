@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import mpcam as mp
-from mpcam.rendering.device import types
+from mpcam.backend import types
 from mpcam.rendering.invert import Inverted
 from mpcam_kernels import regions
 from mpcam_kernels.blocks import LINK

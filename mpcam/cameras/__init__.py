@@ -6,7 +6,6 @@ from mpcam.cameras.double_sphere import DoubleSphere as DoubleSphere
 from mpcam.cameras.kannala_brandt import KannalaBrandt as KannalaBrandt
 from mpcam.cameras.orthographic import Orthographic as Orthographic
 from mpcam.cameras.pinhole import Pinhole as Pinhole
-from mpcam.cameras.pose import look_at as look_at
 from mpcam.cameras.profiles import Profile as Profile
 from mpcam.cameras.profiles import custom_profile as custom_profile
 from mpcam.cameras.radial import Radial as Radial

@@ -11,10 +11,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mpcam.cameras.capabilities import Bounds, HasRays, Projects, need
-from mpcam.cameras.pose import as_pose, frame_origin
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
+from mpcam.math.pose import as_pose, frame_origin
 
 
 def _quiet() -> np.errstate:
@@ -176,10 +177,8 @@ class Camera:
     def _check_frame(self) -> None:
         """Check and normalize width, height and pose at construction."""
         for name in ("width", "height"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise InputError(f"{type(self).__name__}({name}={value!r}): a whole number of pixels >= 1 is needed")
-            object.__setattr__(self, name, int(value))
+            side = whole_number(name, getattr(self, name), 1, of=type(self).__name__, unit="pixels")
+            object.__setattr__(self, name, side)
         object.__setattr__(self, "camera_from_world", as_pose(self.camera_from_world))
         register_pytrees()
 

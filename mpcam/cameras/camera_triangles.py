@@ -7,11 +7,11 @@ import numpy as np
 
 from mpcam.cameras.atlas import Atlas, atlas
 from mpcam.cameras.base import Camera, register_pytrees
-from mpcam.cameras.pose import as_pose
 from mpcam.cameras.types import Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, cross, dot, isfinite, library, normalize, plain, take, vector, where
 from mpcam.math.optics import reflect, refract
+from mpcam.math.pose import as_pose
 
 SCALES = ("unit", "plane", "near_far")
 

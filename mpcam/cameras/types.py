@@ -2,6 +2,8 @@
 
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from mpcam.math import Array
 
 RayGeometry = Literal["central", "parallel", "general"]
@@ -17,6 +19,16 @@ class Ray(NamedTuple):
     origin: Array
     direction: Array
     valid: Array
+
+
+class PosedRays(NamedTuple):
+    """Rays of pixels in a frame that is not the world's: what hits were found with.
+
+    pose: 4x4, frame from world. ray: on the device, one per pixel, row by row.
+    """
+
+    pose: np.ndarray
+    ray: Ray
 
 
 class Projection(NamedTuple):

@@ -4,7 +4,9 @@
 function (`mpcam.compare` would name both once the package is imported).
 """
 
+from mpcam.comparison.columns import COLUMNS
 from mpcam.comparison.driver import compare
-from mpcam.comparison.table import COLUMNS, Comparison, Row
+from mpcam.comparison.rows import Row
+from mpcam.comparison.table import Comparison
 
 __all__ = ["COLUMNS", "Comparison", "Row", "compare"]

@@ -29,7 +29,7 @@ def run_demo(
     """
     from rich.console import Console
 
-    from mpcam.geometry.builtin import builtin_scene
+    from mpcam.scene.builtin import builtin_scene
 
     console = console or Console()
     done = []

@@ -1,6 +1,6 @@
 """`mpcam.compare`: a scene through every projection model that applies, each against the truth and the clock."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,15 @@ import numpy as np
 from mpcam.comparison import metrics, timing
 from mpcam.comparison.facts import machine_facts, scene_facts
 from mpcam.comparison.mirrors import mirror_plan, mirror_rows
+from mpcam.comparison.motion import MOTION, moving_frame, moving_vertices
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.plan import Choice, make_plan
 from mpcam.comparison.progress import Progress, Steps
-from mpcam.comparison.table import Comparison, Row
+from mpcam.comparison.rows import Row
+from mpcam.comparison.table import Comparison
 from mpcam.errors import InputError
 
 WARMUP = 2
-MOTION = 1e-3
-"""How far the vertices of the moving scene swing, as a share of the scene's diagonal."""
 
 
 @dataclass
@@ -55,9 +55,9 @@ def compare(
     `InputError` for a scene without camera or triangles, unknown methods or settings, and an unusable output folder.
     """
     from mpcam.comparison.output import check_output
-    from mpcam.geometry.scene import Scene
     from mpcam.rendering.methods import prepare, rasterize
     from mpcam.rendering.shade import shade
+    from mpcam.scene.scene import Scene
 
     scene = Scene.of(scene)
     camera = scene.camera if camera is None else camera
@@ -195,18 +195,6 @@ def _mirrored(
     return comparison
 
 
-def moving_vertices(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Two vertex arrays (V, 3) to alternate between: each vertex swings by a thousandth of the scene's diagonal, with a
-    phase that depends on where it is, so that no rigid motion could stand in for new vertices."""
-    low, high = mesh.bounds
-    diagonal = float(np.linalg.norm(high - low))
-    vertices = np.asarray(mesh.vertices, np.float64)
-    with np.errstate(invalid="ignore", over="ignore"):
-        phase = (vertices - low) @ np.array([5.0, 7.0, 11.0]) / (diagonal or 1.0)
-        swing = MOTION * diagonal * np.stack([np.sin(phase), np.cos(phase), np.sin(2 * phase)], axis=-1)
-        return vertices, vertices + swing
-
-
 def _left_out(refused: Mapping[Choice, str], cases: Iterable[_Case]) -> dict[str, str]:
     """Reasons by method where all its settings were refused alike, else by setting."""
     served = {case.choice.method for case in cases}
@@ -270,19 +258,6 @@ class _Shading:
         from mpcam.rendering.shade import shade_device
 
         return shade_device(self.hits, self.scene, self.shading)
-
-
-def moving_frame(prepared: Any, positions: Sequence[np.ndarray]) -> Callable[[], object]:
-    """A frame that starts with new vertices: each call takes the next of `positions`."""
-    count = 0
-
-    def frame() -> object:
-        nonlocal count
-        count += 1
-        prepared.update(positions[count % len(positions)])
-        return prepared.frame()
-
-    return frame
 
 
 def _how(repeats: int, moving: bool) -> dict[str, str]:

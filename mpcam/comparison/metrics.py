@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpcam.errors import InputError
-from mpcam.io.srgb import srgb_from_linear
+from mpcam.math.srgb import srgb_from_linear
 
 # A hit on another triangle counts as wrong only where the surface is another one too: along shared edges, and where
 # triangles coincide, two correct methods may name different triangles at the same depth.

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from mpcam.comparison import metrics, timing
+from mpcam.comparison.motion import moving_frame
 from mpcam.comparison.plan import LEVELS, PARAMETER, Choice
 from mpcam.comparison.progress import Steps
-from mpcam.comparison.table import Row
+from mpcam.comparison.rows import Row
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.effects.reflection import METHODS, Reflection
 from mpcam.errors import InputError
-from mpcam.geometry.scene import Scene
+from mpcam.scene.scene import Scene
 
 TRIANGLES = (26, 52, 104, 208, 416, 1664)
 SIZES = (64, 256, 1024)
@@ -101,8 +102,6 @@ def mirror_rows(
     for label, found in still.items():
         rows[label] = replace(rows[label], still_ms=1e3 * found.median, still_spread=1e3 * found.spread)
     if moving is not None:
-        from mpcam.comparison.driver import moving_frame
-
         calls = {label: moving_frame(picture, moving) for label, picture in pictures.items()}
         for label, found in timing.measure(calls, repeats, warmup, on_call=steps.done).items():
             rows[label] = replace(rows[label], moving_ms=1e3 * found.median, moving_spread=1e3 * found.spread)

@@ -1,4 +1,4 @@
-"""Numbers as people read them: three digits, no needless zeros, one way everywhere."""
+"""Numbers as people read them, three digits and no needless zeros, and as JSON can hold them."""
 
 import math
 
@@ -37,6 +37,15 @@ def format_spread(value: float, spread: float) -> str:
         return text
     decimals = max(2 - math.floor(math.log10(value)), 0) if value > 0 else 2
     return f"{value:,.{decimals}f} ±{spread / 2:,.{decimals}f}"
+
+
+def json_number(value: float | None) -> float | int | str | None:
+    """A number as JSON can hold it: None for NaN, "inf" for infinity, an integer where it is one."""
+    if value is None or math.isnan(value):
+        return None
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return int(value) if float(value).is_integer() and abs(value) < 2**53 else float(value)
 
 
 def _strip(text: str) -> str:

@@ -8,17 +8,17 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mpcam.comparison import plot, report
+from mpcam.comparison.encode import as_csv, as_dict
 from mpcam.comparison.metrics import flip_map
+from mpcam.comparison.rows import Findings
 from mpcam.errors import InputError
 from mpcam.io.images import write_image
-
-if TYPE_CHECKING:
-    from mpcam.comparison.table import Comparison
+from mpcam.math.srgb import linear_from_srgb
 
 PAGE, RESULTS = "report.html", "results.json"
 _LISTED = re.compile(r"(?:images/)?[a-z0-9.-]+\.(?:png|csv)")
@@ -34,7 +34,7 @@ def check_output(output: str | Path) -> None:
         raise InputError(f"Output {str(output)!r} cannot be written: no permission in {str(parent)!r}; choose another.")
 
 
-def write(comparison: "Comparison", output: str | Path) -> Path:
+def write(comparison: Findings, output: str | Path) -> Path:
     """Write all files of a comparison into a folder and return the path of the report page.
 
     report.html (self-contained), results.csv, results.json, pareto.png, truth.exr (linear light, distances, camera) and
@@ -76,7 +76,7 @@ def write_results(folder: Path, results: dict[str, Any]) -> None:
     (folder / RESULTS).write_text(text + "\n", encoding="utf-8")
 
 
-def differences(comparison: "Comparison") -> dict[str, np.ndarray]:
+def differences(comparison: Findings) -> dict[str, np.ndarray]:
     """FLIP maps (H, W) in [0, 1] by row label, for rows that have an image."""
     if comparison.truth_image is None:
         return {}
@@ -87,14 +87,12 @@ def magma(values: np.ndarray) -> np.ndarray:
     """Values (H, W) in [0, 1] in the colours that FLIP is shown in, black to white, as linear RGB."""
     import matplotlib
 
-    from mpcam.io.srgb import linear_from_srgb
-
     colors = matplotlib.colormaps["magma"](np.clip(values, 0.0, 1.0))[..., :3]
     black = np.asarray(values)[..., None] <= 0.0  # the map starts at a dark violet; no error shall look like none
     return linear_from_srgb(np.where(black, 0.0, colors)).astype(np.float32)
 
 
-def _fill(comparison: "Comparison", folder: Path) -> None:
+def _fill(comparison: Findings, folder: Path) -> None:
     (folder / "images").mkdir()
     names = _names(list(comparison.images))
     page_images: dict[str, report.RowImages] = {}
@@ -111,11 +109,11 @@ def _fill(comparison: "Comparison", folder: Path) -> None:
         if label in errors:
             write_image(folder / "images" / f"{names[label]}-difference.png", errors[label])
         page_images[label] = report.RowImages(image, errors.get(label))
-    (folder / "results.csv").write_text(comparison.to_csv(), encoding="utf-8")
+    (folder / "results.csv").write_text(as_csv(comparison), encoding="utf-8")
     plot.draw(comparison, folder / "pareto.png")
     page = report.build(comparison, page_images)
     (folder / PAGE).write_text(page, encoding="utf-8")
-    write_results(folder, comparison.to_dict())
+    write_results(folder, as_dict(comparison))
 
 
 def _publish(staging: Path, target: Path) -> None:

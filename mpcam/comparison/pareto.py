@@ -1,16 +1,14 @@
 """The Pareto front of error against time, and which method wins at which time budget."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpcam.comparison.columns import COLUMNS, ERROR_COLUMNS, TIME_COLUMNS
 from mpcam.comparison.numbers import format_column, format_number
-from mpcam.comparison.table import COLUMNS, ERROR_COLUMNS, TIME_COLUMNS, Row
-
-if TYPE_CHECKING:
-    from mpcam.comparison.table import Comparison
+from mpcam.comparison.rows import Findings, Row
 
 # "At float precision": 95% of the hits this near to their pixel's centre, and this share of pixels with the wrong hit.
 # float32 pixel coordinates of a 1000-pixel image are 6e-5 apart; a ray's direction and its hit lose a few bits more.
@@ -49,7 +47,7 @@ def is_exact(row: Row) -> bool:
     return row.projection_p95 <= EXACT_PIXELS and row.hit_mismatch <= EXACT_MISMATCH
 
 
-def winners(comparison: "Comparison", error: str = "flip", time: str = "still_ms") -> list[Winner]:
+def winners(comparison: Findings, error: str = "flip", time: str = "still_ms") -> list[Winner]:
     """The front from fast to exact; it ends at the first row at float precision, beyond which nothing is gained."""
     errors, times = comparison.column(error), comparison.column(time)
     front = pareto_front(errors, times)
@@ -81,7 +79,7 @@ def quality(winner: Winner, error: str) -> str:
     return text
 
 
-def winner_sentence(comparison: "Comparison", error: str = "flip", time: str = "still_ms") -> str:
+def winner_sentence(comparison: Findings, error: str = "flip", time: str = "still_ms") -> str:
     """Which method wins at which time budget, e.g. "From 0.8 ms: cubemap 128 (FLIP 0.03); from 2.3 ms: invert
     (FLIP 0.0002, at float precision). Below 0.8 ms no method finishes a frame." """
     won = winners(comparison, error, time)
@@ -91,7 +89,7 @@ def winner_sentence(comparison: "Comparison", error: str = "flip", time: str = "
     return f"F{'; '.join(parts)[1:]}. Below {format_number(won[0].start_ms)} ms no method finishes a frame."
 
 
-def headline(comparison: "Comparison") -> str:
+def headline(comparison: Findings) -> str:
     """The result in a sentence or two: which method is fastest at float precision, and what the others there take."""
     exact = [row for row in comparison.rows if is_exact(row) and not np.isnan(row.still_ms)]
     if not exact:
@@ -124,7 +122,7 @@ def _fastest(rows: list[Row], time: str) -> str:
     return f"{', '.join(level[:-1])} and {level[-1]} are level"
 
 
-def fronts(comparison: "Comparison") -> list[dict[str, Any]]:
+def fronts(comparison: Findings) -> list[dict[str, Any]]:
     """For each time and error column that has numbers: the front and the winners, fast to slow, and the sentence."""
     found = []
     for time in TIME_COLUMNS:

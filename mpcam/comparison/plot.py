@@ -2,15 +2,13 @@
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mpcam.comparison.columns import COLUMNS
 from mpcam.comparison.pareto import pareto_front
-from mpcam.comparison.table import COLUMNS
-
-if TYPE_CHECKING:
-    from mpcam.comparison.table import Comparison
+from mpcam.comparison.rows import Findings
 
 # Colours that stay apart for colour-blind readers (after Okabe and Ito), darkened for white paper; shapes tell too.
 STYLES = {
@@ -28,7 +26,7 @@ OTHER = ("#8a6d00", "P")
 ERRORS = ("flip", "projection_median", "ray_angle")
 
 
-def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ERRORS) -> None:
+def draw(comparison: Findings, path: Path, errors: tuple[str, ...] = ERRORS) -> None:
     """Write a PNG with a row of log-log panels for each error, one for each time that was measured, with the front.
 
     Errors that no row has get no panel. Errors of zero have no place on a log axis: they stand in a band marked 0
@@ -42,7 +40,7 @@ def draw(comparison: "Comparison", path: Path, errors: tuple[str, ...] = ERRORS)
         _draw(comparison, path, known)
 
 
-def _draw(comparison: "Comparison", path: Path, errors: tuple[str, ...]) -> None:
+def _draw(comparison: Findings, path: Path, errors: tuple[str, ...]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -68,7 +66,7 @@ def _draw(comparison: "Comparison", path: Path, errors: tuple[str, ...]) -> None
 
 
 def _panel(
-    axes: Any, comparison: "Comparison", error: str, time: str, handles: dict[str, Any]
+    axes: Any, comparison: Findings, error: str, time: str, handles: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points, lines and front of one error against one time; returns where the points are, and which are shown."""
     times, errors = comparison.column(time), comparison.column(error) * (100 if COLUMNS[error].unit == "%" else 1)

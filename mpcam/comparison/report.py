@@ -8,15 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mpcam.comparison.encode import as_dict
 from mpcam.comparison.pareto import headline
+from mpcam.comparison.rows import Findings
 from mpcam.io.images import write_image
-
-if TYPE_CHECKING:
-    from mpcam.comparison.table import Comparison
 
 BUDGET = 14_000_000
 """Bytes of images in the page, as text; beyond it they are shown smaller (the PNG files beside it stay whole)."""
@@ -31,9 +30,9 @@ class RowImages:
     difference: np.ndarray | None = None
 
 
-def build(comparison: "Comparison", images: Mapping[str, RowImages] | None = None, budget: int = BUDGET) -> str:
+def build(comparison: Findings, images: Mapping[str, RowImages] | None = None, budget: int = BUDGET) -> str:
     """The page as text. images: by row label, those that its viewer shows. Every string from outside is escaped."""
-    data = comparison.to_dict() | {"headline": headline(comparison)} | _image_data(comparison, images or {}, budget)
+    data = as_dict(comparison) | {"headline": headline(comparison)} | _image_data(comparison, images or {}, budget)
     parts = {
         "TITLE": html.escape(f"{comparison.name}: error against run time"),
         "STYLE": page_part("style.css"),
@@ -65,7 +64,7 @@ def page_part(name: str) -> str:
     return (files("mpcam.comparison") / "page" / name).read_text(encoding="utf-8")
 
 
-def _image_data(comparison: "Comparison", images: Mapping[str, RowImages], budget: int) -> dict[str, Any]:
+def _image_data(comparison: Findings, images: Mapping[str, RowImages], budget: int) -> dict[str, Any]:
     shrink = 1
     while True:
         truth = "" if comparison.truth_image is None else data_uri(comparison.truth_image, shrink)

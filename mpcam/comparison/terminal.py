@@ -7,12 +7,10 @@ import numpy as np
 
 from mpcam.comparison.numbers import format_column, format_spread
 from mpcam.comparison.pareto import headline, winner_sentence
-from mpcam.comparison.table import Row
+from mpcam.comparison.rows import Findings, Row
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from mpcam.comparison.table import Comparison
 
 WIDTH = 100
 _NUMBERS = (
@@ -33,7 +31,7 @@ _MIRROR = (
 )
 
 
-def print_comparison(comparison: "Comparison", console: "Console | None" = None) -> None:
+def print_comparison(comparison: Findings, console: "Console | None" = None) -> None:
     """Print the table, what was left out and who wins, at most 100 columns wide."""
     from rich.console import Console
 
@@ -49,7 +47,7 @@ def print_comparison(comparison: "Comparison", console: "Console | None" = None)
             console.print(sentence, width=width, highlight=False, markup=False)
 
 
-def as_text(comparison: "Comparison") -> str:
+def as_text(comparison: Findings) -> str:
     """The same without colours, as a string."""
     from rich.console import Console
 
@@ -58,7 +56,7 @@ def as_text(comparison: "Comparison") -> str:
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
 
 
-def _table(comparison: "Comparison"):
+def _table(comparison: Findings):
     from rich import box
     from rich.table import Table
     from rich.text import Text

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
-from mpcam.rendering.device import types
-from mpcam.rendering.exclusive import exclusive
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.ray_error import bent, in_world
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shooting import shoot
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
 DEEPEST = 7
@@ -222,11 +223,9 @@ def _check(cams: Any, index: Any, least: Any, most: Any, tolerance: Any) -> None
     if not isinstance(cams, CameraTriangles):
         raise InputError(f"chained: cams is a {type(cams).__name__}: give CameraTriangles, e.g. from mpcam.decompose")
     for name, value in (("least", least), ("most", most)):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= value <= DEEPEST:
-            raise InputError(f"chained({name}={shown(value)}): give a whole number from 0 to {DEEPEST}")
+        whole_number(name, value, 0, DEEPEST, of="chained")
     if least > most:
         raise InputError(f"chained(least={least}, most={most}): least must not be above most")
     for name, value in (("tolerance", tolerance), ("index", 1.0 if index is None else index)):
-        number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-        if not number or not (np.isfinite(value) and value > 0):
+        if not is_number(value) or value <= 0:
             raise InputError(f"chained({name}={shown(value)}): give a finite number above 0")

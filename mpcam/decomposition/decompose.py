@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import whole_number
 from mpcam.decomposition.coarse import Coarse, Coarsening
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shooting import Locator, shoot
 from mpcam.decomposition.views import SLACK, View, on_mesh, view_of
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
 MODES = ("normals", "directions")
@@ -56,11 +57,10 @@ def decompose(
     """
     if mode not in MODES:
         raise InputError(f"mode={mode!r}: allowed are {', '.join(MODES)}")
-    if isinstance(triangles, bool) or not isinstance(triangles, (int, np.integer)) or not 1 <= triangles <= MOST:
-        raise InputError(f"triangles={shown(triangles)}: give a whole number from 1 to {MOST:,}")
+    triangles = whole_number("triangles", triangles, 1, MOST)
     whole = reflector_of(reflector)
     view = view_of(whole, eye)
-    coarse = _seen_part(whole, view, int(triangles))
+    coarse = _seen_part(whole, view, triangles)
     cams = CameraTriangles(
         coarse.vertices, coarse.faces, normals=coarse.normals, eye=view.eye, resolution=resolution, index=index
     )
@@ -96,8 +96,7 @@ def subdivided(
         raise InputError(
             "subdivided: give camera triangles with normals, and see directions_at_vertices for the result"
         )
-    if isinstance(levels, bool) or not isinstance(levels, (int, np.integer)) or not 0 <= levels <= 6:
-        raise InputError(f"levels={shown(levels)}: give a whole number from 0 to 6")
+    levels = whole_number("levels", levels, 0, 6)
     whole = reflector_of(reflector)
     pose = np.asarray(cams.camera_from_world)
     vertices, normals = (cams.vertices - pose[:3, 3]) @ pose[:3, :3], cams.normals @ pose[:3, :3]

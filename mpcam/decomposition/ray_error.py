@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shooting import Locator
 from mpcam.decomposition.views import seen_samples
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 from mpcam.math.optics import reflect, refract
 
@@ -55,14 +56,13 @@ def ray_error(
     """
     if not isinstance(cams, CameraTriangles):
         raise InputError(f"cams is a {type(cams).__name__}: give CameraTriangles, e.g. from mpcam.decompose")
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or not 1 <= samples <= 10_000_000:
-        raise InputError(f"samples={shown(samples)}: give a whole number from 1 to 10,000,000")
+    samples = whole_number("samples", samples, 1, 10_000_000)
     whole = reflector_of(reflector)
     far = 2.0 * whole.radius if distance is None else distance
-    if isinstance(far, bool) or not isinstance(far, (int, float, np.number)) or not (np.isfinite(far) and far > 0):
+    if not is_number(far) or far <= 0:
         raise InputError(f"distance={shown(distance)}: give a finite number above 0, in scene units")
     cams = in_world(cams)
-    view = seen_samples(whole, eye, int(samples))
+    view = seen_samples(whole, eye, samples)
     check_eye(cams, view.eye, whole.radius)
     index = cams.index
     true, passes = bent(view.points - view.eye, view.normals, index)

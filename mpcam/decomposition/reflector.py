@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
+from mpcam.backend import exclusive
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
@@ -87,8 +88,7 @@ class Reflector:
     def _traced(self, origin: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, ...]:
         import drjit as dr
 
-        from mpcam.rendering.exclusive import exclusive
-        from mpcam.truth.variant import mitsuba
+        from mpcam.tracing.variant import mitsuba
 
         @exclusive
         def run() -> tuple[np.ndarray, ...]:
@@ -106,8 +106,8 @@ class Reflector:
     @functools.cached_property
     def _scene(self) -> tuple[Any, np.ndarray]:
         """Mitsuba's scene of the usable faces in units of the radius around the centre, and their numbers."""
-        from mpcam.truth.meshes import mitsuba_mesh
-        from mpcam.truth.variant import mitsuba
+        from mpcam.tracing.meshes import mitsuba_mesh
+        from mpcam.tracing.variant import mitsuba
 
         places = (self.vertices - self.center) / (self.radius or 1.0)
         numbers = np.flatnonzero(self.usable)

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import shown
 from mpcam.decomposition.ray_error import bent, check_eye, in_world, vertex_normals
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.decomposition.shooting import Locator
 from mpcam.decomposition.views import eye_point
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.device import opaque_numbers, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.methods import rasterize
 
 FILTERS = ("linear", "nearest")

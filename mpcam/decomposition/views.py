@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.checks import shown
 from mpcam.decomposition.reflector import Reflector
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import shown
 
 SAMPLES = 60_000
 """Points of the surface that tell what an eye sees, where it is a point."""

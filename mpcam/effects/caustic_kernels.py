@@ -6,7 +6,7 @@ Positions are in the frame of the receivers' device mesh (`DeviceMesh`), or turn
 import functools
 from typing import Any
 
-from mpcam.rendering.device import types
+from mpcam.backend import types
 
 DENSITY = 2.0
 """Points that a landed triangle is dropped at, for each pixel that it covers."""

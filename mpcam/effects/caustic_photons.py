@@ -7,13 +7,13 @@ import numpy as np
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.cameras.pose import look_at
 from mpcam.cameras.radial import Radial
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.ray_error import bent, vertex_normals
 from mpcam.decomposition.reflector import Reflector
 from mpcam.decomposition.resolve import texel_weights
 from mpcam.decomposition.shooting import Locator
+from mpcam.math.pose import look_at
 from mpcam.rendering.methods import rasterize
 
 MARGIN = 1.0

@@ -13,8 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
@@ -23,14 +25,14 @@ from mpcam.effects import caustic_kernels as kernels
 from mpcam.effects.caustic_photons import Photons, photons, pixel_solid_angles, solid_angle
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
-from mpcam.geometry.scene import PointLight, Scene
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.device import DeviceMesh, lens, opaque_numbers, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device import DeviceMesh
+from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade
+from mpcam.scene.scene import PointLight, Scene
 
 CHUNK = 1 << 22
 """Points that flux is dropped at, at a time."""
@@ -194,7 +196,7 @@ class Caustics:
     def _surface(self) -> dict[str, Any]:
         """What photons need to know of the eye's pixels."""
         device, pose = self._atlas, self._atlas.device.pose(self.camera.camera_from_world)
-        seen = self.hits.device_triangle, self.hits.device_depth, lens(self.camera).ray.direction
+        seen = self.hits.device_triangle, self.hits.device_depth, device_camera(self.camera).ray.direction
         return kernels.surface()(seen, self._angles, pose, self._rays, device.vertices, device.faces, self._table)
 
     @functools.cached_property
@@ -207,7 +209,7 @@ class Caustics:
 
         t, size = types(), self.photons.camera.width
         width, height = self.camera.width, self.camera.height
-        eye, pose = lens(self.camera).on_device, self._atlas.device.pose(self.camera.camera_from_world)
+        eye, pose = device_camera(self.camera).on_device, self._atlas.device.pose(self.camera.camera_from_world)
         many, flux, unit, surface = 2 * (size - 1) ** 2, self._rays["flux"], self._rays["unit"], self._surface
         model = (type(self.camera), tuple(getattr(self.camera, name) for name in self.camera.static_fields))
         plan = kernels.plan(size, width, height, model)
@@ -395,9 +397,8 @@ def caustics(
     whole = Scene.of(scene)
     if not isinstance(light, PointLight):
         raise InputError(f"caustics: light is a {type(light).__name__}: give a PointLight")
-    if isinstance(photons, bool) or not isinstance(photons, (int, np.integer)) or not 2 <= photons <= 4096:
-        raise InputError(f"caustics(photons={shown(photons)}): give a whole number from 2 to 4096")
-    if isinstance(radius, bool) or not isinstance(radius, (int, float, np.number)) or not 0 <= radius <= 8:
+    photons = whole_number("photons", photons, 2, 4096, of="caustics")
+    if not is_number(radius) or not 0 <= radius <= 8:
         raise InputError(f"caustics(radius={shown(radius)}): give pixels from 0 to 8")
     if back is not None and index is None:
         raise InputError(
@@ -415,7 +416,7 @@ def caustics(
     settings = Settings(
         triangles=triangles,
         resolution=resolution,
-        photons=int(photons),
+        photons=photons,
         radius=float(radius),
         index=index,
         back=back,

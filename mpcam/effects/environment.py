@@ -1,18 +1,16 @@
 """Environment maps: what is seen from one point, in all directions, as two paraboloid views (Gascuel et al. 2008)."""
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
 from mpcam.effects.vectors import as_vector, as_vectors
 from mpcam.errors import InputError
-from mpcam.geometry.scene import Scene
-from mpcam.rendering.device import opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
 
 
 @dataclass(frozen=True)
@@ -108,19 +106,3 @@ class EnvironmentMap:
     def __repr__(self) -> str:
         size = len(self.images[0])
         return f"EnvironmentMap(2 x {size}x{size}, position={self.position.tolist()})"
-
-
-def environment_map(
-    scene: Any, position: Any, size: int = 512, shading: str = "light", method: str = "invert", **settings: Any
-) -> EnvironmentMap:
-    """Colours of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
-
-    scene: a Scene, a Mesh or several meshes; its mirror is left out. position (3,): world, away from surfaces. size:
-    pixels along a side of each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.
-    """
-    from mpcam.rendering.methods import render
-
-    cameras = back_to_back(as_vector(position, "position"), check_size(size))
-    whole = replace(Scene.of(scene), mirror=None)
-    front, back = (render(camera, whole, method, shading=shading, **settings) for camera in cameras)
-    return EnvironmentMap(position, (front, back))

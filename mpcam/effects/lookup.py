@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras.pose import look_at
+from mpcam.backend import types
 from mpcam.cameras.radial import Radial
-from mpcam.errors import InputError
+from mpcam.checks import whole_number
 from mpcam.math import atan
-from mpcam.rendering.device import types
+from mpcam.math.pose import look_at
 
 RIM = 2
 LEAST, MOST = 8, 16384  # pixels along a side
@@ -20,9 +20,7 @@ LEAST, MOST = 8, 16384  # pixels along a side
 
 def check_size(size: Any, name: str = "size") -> int:
     """The number of pixels along a side of a map; raises InputError unless it is a whole number that can be served."""
-    if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or not LEAST <= size <= MOST:
-        raise InputError(f"{name}={size!r}: a whole number of pixels from {LEAST} to {MOST} is needed")
-    return int(size)
+    return whole_number(name, size, LEAST, MOST, unit="pixels")
 
 
 def pixels_per_radius(size: int) -> float:

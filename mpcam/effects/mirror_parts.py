@@ -1,26 +1,48 @@
 """What is seen in a mirror, by one method each; parts of a `Reflection`."""
 
 import functools
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
+from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.decomposition.decompose import decompose
+from mpcam.cameras.types import Ray
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.decomposition.resolve import Resolver
 from mpcam.effects.environment import DeviceEnvironment
 from mpcam.effects.lookup import back_to_back
 from mpcam.effects.virtual_vertices import VirtualVertices
-from mpcam.rendering.device import opaque_numbers, opaque_zero, types
+from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.surfaces import Surface
+from mpcam.rendering.explanation import Step
+from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
+from mpcam.rendering.raytrace import RayTraced
 
-if TYPE_CHECKING:
-    from mpcam.effects.reflection import Reflection
+Shaded = Callable[[Hits], Any]
+"""From first hits on the scene to their colors: an Array3f on the device."""
+STAGES = {
+    "camera triangles": "",
+    "candidates": "",
+    "root finding": "rays of pixels are known; only project() needs the cubic",
+    "straight edges": "",
+    "atlas to picture": "",
+    "environment map": "",
+    "rays of the true surface": "",
+}
+"""What any part may do, in order, and why a part does without it where this is not the method itself."""
 
 
-class Part(Protocol):
+class MirrorPart(Protocol):
     """What is seen in the mirror, by one method."""
+
+    @property
+    def stages(self) -> Mapping[str, str]:
+        """Which of STAGES it takes, and on what."""
+        ...
 
     def update(self, vertices: np.ndarray) -> None:
         """New positions (V, 3) of the scene's vertices."""
@@ -31,43 +53,77 @@ class Part(Protocol):
         ...
 
 
+def explained(part: MirrorPart, method: str) -> Iterator[Step]:
+    """All of STAGES, and what a part makes of each."""
+    runs = part.stages
+    for name, why_not in STAGES.items():
+        yield Step(name, name in runs, runs.get(name) or why_not or f"method {method!r}")
+
+
 class Direct:
     """The colours of first hits, one for each pixel of the eye."""
 
-    def __init__(self, whole: "Reflection", prepared: Any):
-        self.whole, self.prepared = whole, prepared
+    def __init__(self, prepared: Any, shaded: Shaded):
+        self.prepared, self.shaded = prepared, shaded
 
     def update(self, vertices: np.ndarray) -> None:
         self.prepared.update(vertices)
 
     def colours(self) -> list[Any]:
-        return list(self.whole.shaded(self.prepared.frame()))
+        return list(self.shaded(self.prepared.frame()))
 
 
 class ByTriangles(Direct):
-    """The scene through camera triangles, brought to the eye's pixels."""
+    """The scene through camera triangles, brought to the eye's pixels. surface: the mirror's own."""
 
-    def __init__(self, whole: "Reflection", triangles: int, resolution: int, cams: CameraTriangles | None):
-        self.cams = decomposed(whole, triangles, resolution) if cams is None else cams
-        super().__init__(whole, prepare(self.cams, whole.scene.mesh))
-        self.resolver = Resolver(self.cams, whole.mirror.surface, whole.camera)
+    def __init__(self, camera: Camera, mesh: Mesh, surface: Mesh | Surface, cams: CameraTriangles, shaded: Shaded):
+        super().__init__(prepare(cams, mesh), shaded)
+        self.cams, self.resolver = cams, Resolver(cams, surface, camera)
         self._nothing = opaque_numbers([0.0, 0.0, 0.0])
+
+    @property
+    def stages(self) -> dict[str, str]:
+        bent = "their pixels bend the camera's rays by interpolated normals"
+        return {
+            "camera triangles": f"{self.cams.count} that the camera sees; {bent}",
+            "candidates": "groups and blocks of rays against clusters of triangles",
+            "atlas to picture": "texels by the true surface's points, found once",
+        }
 
     def colours(self) -> list[Any]:
         import drjit as dr
 
-        atlas = self.whole.shaded(self.prepared.frame())
+        atlas = self.shaded(self.prepared.frame())
         return self.resolver.on_device(dr.ravel(atlas), self._nothing)
 
 
-class ByEnvironment:
-    """Two views of the surroundings from the mirror's middle, looked up along the true rays."""
+class ByVertices(Direct):
+    """The scene's vertices where the mirror shows them, joined by straight edges. ray: those of the true surface."""
 
-    def __init__(self, whole: "Reflection", size: int):
-        self.whole, self.size = whole, size
-        middle = reflector_of(whole.mirror.surface).center
-        self.views = [prepare(camera, whole.scene.mesh) for camera in back_to_back(middle, size)]
-        directions = np.ascontiguousarray(np.asarray(whole.rays.ray.direction).T, np.float32)
+    def __init__(self, camera: Camera, mesh: Mesh, cams: CameraTriangles, ray: Ray, level: int, shaded: Shaded):
+        super().__init__(VirtualVertices(camera, mesh, cams, ray, level), shaded)
+        self.cams = cams
+
+    @property
+    def stages(self) -> dict[str, str]:
+        return {
+            "camera triangles": f"{self.cams.count} that the camera sees; with rays at the corners",
+            "candidates": "camera triangles against clusters of vertices",
+            "root finding": "the image of each vertex, by the cubic",
+            "straight edges": "between the images of vertices",
+        }
+
+
+class ByEnvironment:
+    """Two views of the surroundings from the surface's middle, looked up along the true rays."""
+
+    stages = {"environment map": "two views from the mirror's middle"}
+
+    def __init__(self, mesh: Mesh, surface: Mesh | Surface, ray: Ray, size: int, shaded: Shaded):
+        self.size, self.shaded = size, shaded
+        middle = reflector_of(surface).center
+        self.views = [prepare(camera, mesh) for camera in back_to_back(middle, size)]
+        directions = np.ascontiguousarray(np.asarray(ray.direction).T, np.float32)
         self.directions = types().Array3f(directions) + opaque_zero()
 
     def update(self, vertices: np.ndarray) -> None:
@@ -77,7 +133,7 @@ class ByEnvironment:
     def colours(self) -> list[Any]:
         import drjit as dr
 
-        parts: list[Any] = [dr.ravel(self.whole.shaded(view.frame())) for view in self.views]
+        parts: list[Any] = [dr.ravel(self.shaded(view.frame())) for view in self.views]
         texels = dr.concat(parts)
         return list(_look_up()(DeviceEnvironment(texels, self.size), self.directions))
 
@@ -96,21 +152,7 @@ def _look_up() -> Any:
 class ByTracing(Direct):
     """The scene along the rays of the true surface."""
 
-    def __init__(self, whole: "Reflection"):
-        from mpcam.truth.raytrace import RayTraced
+    stages = {"rays of the true surface": "traced anew in each frame"}
 
-        super().__init__(whole, RayTraced(whole.camera, whole.scene.mesh, whole.rays.ray))
-
-
-class ByVertices(Direct):
-    """The scene's vertices where the mirror shows them, joined by straight edges."""
-
-    def __init__(self, whole: "Reflection", triangles: int, level: int, cams: CameraTriangles | None):
-        self.cams = decomposed(whole, triangles, 2) if cams is None else cams
-        super().__init__(whole, VirtualVertices(whole.camera, whole.scene.mesh, self.cams, whole.rays.ray, level))
-
-
-def decomposed(whole: "Reflection", triangles: int, resolution: int) -> CameraTriangles:
-    """Camera triangles of a picture's mirror."""
-    mirror = whole.mirror
-    return decompose(mirror.surface, whole.camera, triangles, resolution=resolution, index=mirror.index)
+    def __init__(self, camera: Camera, mesh: Mesh, ray: Ray, shaded: Shaded):
+        super().__init__(RayTraced(camera, mesh, ray), shaded)

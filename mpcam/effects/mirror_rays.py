@@ -8,8 +8,8 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.types import Ray
 from mpcam.decomposition.ray_error import bent
 from mpcam.decomposition.reflector import reflector_of
-from mpcam.geometry.mirror import Mirror
 from mpcam.geometry.surfaces import Surface
+from mpcam.scene.mirror import Mirror
 
 
 class MirrorRays(NamedTuple):

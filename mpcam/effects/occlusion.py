@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.radial import Radial
+from mpcam.checks import is_number, whole_number
 from mpcam.effects.lookup import LEAST
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
-from mpcam.rendering.device import lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.methods import prepare
+from mpcam.scene.scene import Scene
 
 WEIGHTS = {"cosine": "cosine_sphere", "uniform": "equisolid"}
 OFFSET = 1e-5  # of half the longest side of the mesh: some thirty times what float32 loses
@@ -47,7 +49,7 @@ def form_factor(
         return np.zeros(eyes.shape[:-1])
     if offset is None:
         offset = OFFSET * 0.5 * float((whole.bounds[1] - whole.bounds[0]).max())
-    elif isinstance(offset, bool) or not isinstance(offset, (int, float, np.number)) or not np.isfinite(offset):
+    elif not is_number(offset):
         raise InputError(f"offset={offset!r}: a finite length in scene units is needed")
     centre = [0.5 * size + shift for shift in CENTRE]
     camera = Radial(size, size, kind, radius=0.5 * size - 0.5, cx=centre[0], cy=centre[1])
@@ -69,9 +71,7 @@ def ambient_occlusion(
 def _check_view(size: Any, weight: Any) -> tuple[int, str]:
     if weight not in WEIGHTS:
         raise InputError(f"weight={weight!r}: allowed are {', '.join(WEIGHTS)}")
-    if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or not LEAST <= size <= MOST:
-        raise InputError(f"size={size!r}: a whole number of pixels from {LEAST} to {MOST} is needed")
-    return int(size), WEIGHTS[weight]
+    return whole_number("size", size, LEAST, MOST, unit="pixels"), WEIGHTS[weight]
 
 
 @exclusive
@@ -81,8 +81,6 @@ def _covered(camera: Radial, mesh: Mesh, eyes: np.ndarray, normals: np.ndarray) 
     One prepared camera is moved: of what it keeps, only the pose changes. Counts stay on the device until the last.
     """
     import drjit as dr
-
-    from mpcam.rendering.methods import prepare
 
     t = types()
     prepared: Any = prepare(camera, mesh, output="coverage")
@@ -95,7 +93,7 @@ def _covered(camera: Radial, mesh: Mesh, eyes: np.ndarray, normals: np.ndarray) 
         seen = dr.select(prepared.frame().device_mask, t.UInt(1), 0)
         dr.scatter_reduce(dr.ReduceOp.Add, totals, seen, dr.opaque(t.UInt, number))
         dr.eval(totals)
-    valid: Any = dr.count(lens(camera).ray.valid)
+    valid: Any = dr.count(device_camera(camera).ray.valid)
     return np.asarray(totals.numpy(), np.float64) / max(int(valid[0]), 1)
 
 

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.decomposition.decompose import decompose
 from mpcam.effects.lookup import check_size
-from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, Part
+from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, MirrorPart, explained
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.mirror import Mirror
-from mpcam.geometry.scene import Scene
-from mpcam.rendering.device import opaque_numbers, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.explain import Explanation, Step
+from mpcam.rendering.explanation import Explanation, Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import check_shading, check_shadows, shade_device
+from mpcam.scene.mirror import Mirror
+from mpcam.scene.scene import Scene
 
 SETTINGS: dict[str, tuple[str, ...]] = {
     "camera_triangles": ("triangles", "resolution", "cams"),
@@ -85,17 +85,34 @@ class Reflection:
                 fitting = " or ".join(repr(one) for one in METHODS if name in SETTINGS[one])
                 raise InputError(f"{name}= goes with method={fitting}, not with {method!r}")
         self.direct = prepare(given, scene.mesh)
-        self.part: Part
-        many = found.triangles if triangles is None else triangles
-        if method == "camera_triangles":
-            self.part = ByTriangles(self, many, found.resolution if resolution is None else resolution, cams)
-        elif method == "vertex":
-            self.part = ByVertices(self, many, 0 if level is None else level, cams)
-        elif method == "environment":
-            self.part = ByEnvironment(self, check_size(512 if size is None else size))
-        else:
-            self.part = ByTracing(self)
+        self.part = self._part(triangles, resolution, size, level, cams)
         self._color = opaque_numbers(list(found.color))
+
+    def _part(
+        self,
+        triangles: int | None,
+        resolution: int | None,
+        size: int | None,
+        level: int | None,
+        cams: CameraTriangles | None,
+    ) -> MirrorPart:
+        """What the method shows in the mirror."""
+        camera, mesh, mirror = self.camera, self.scene.mesh, self.mirror
+
+        def decomposed(side: int) -> CameraTriangles:
+            many = mirror.triangles if triangles is None else triangles
+            return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index)
+
+        if self.method == "camera_triangles":
+            found = decomposed(mirror.resolution if resolution is None else resolution) if cams is None else cams
+            return ByTriangles(camera, mesh, mirror.surface, found, self.shaded)
+        if self.method == "vertex":
+            found = decomposed(2) if cams is None else cams
+            return ByVertices(camera, mesh, found, self.rays.ray, 0 if level is None else level, self.shaded)
+        if self.method == "environment":
+            size = check_size(512 if size is None else size)
+            return ByEnvironment(mesh, mirror.surface, self.rays.ray, size, self.shaded)
+        return ByTracing(camera, mesh, self.rays.ray, self.shaded)
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
@@ -135,49 +152,10 @@ class Reflection:
     @property
     def explanation(self) -> Explanation:
         """Which stages a frame takes, which are left out, and why."""
-        triangles, tracing = isinstance(self.part, ByTriangles), self.method == "raytrace"
-        vertices = isinstance(self.part, ByVertices)
-        many = f"{self.cams.count} that the camera sees; " if self.cams else ""
-        bent = (
-            "their pixels bend the camera's rays by interpolated normals" if triangles else "with rays at the corners"
-        )
-        other = f"method {self.method!r}"
+        direct = Step("direct view", True, f"{self.scene.mesh.triangle_count:,} scene triangles beside the mirror")
         lost = self.scene.environment is not None
-        return Explanation(
-            (
-                Step("direct view", True, f"{self.scene.mesh.triangle_count:,} scene triangles beside the mirror"),
-                Step("camera triangles", triangles or vertices, f"{many}{bent}" if self.cams else other),
-                Step(
-                    "candidates",
-                    triangles or vertices,
-                    "groups and blocks of rays against clusters of triangles"
-                    if triangles
-                    else "camera triangles against clusters of vertices"
-                    if vertices
-                    else other,
-                ),
-                Step(
-                    "root finding",
-                    vertices,
-                    "the image of each vertex, by the cubic"
-                    if vertices
-                    else "rays of pixels are known; only project() needs the cubic",
-                ),
-                Step("straight edges", vertices, "between the images of vertices" if vertices else other),
-                Step(
-                    "atlas to picture",
-                    triangles,
-                    "texels by the true surface's points, found once" if triangles else other,
-                ),
-                Step(
-                    "environment map",
-                    self.method == "environment",
-                    "two views from the mirror's middle" if self.method == "environment" else other,
-                ),
-                Step("rays of the true surface", tracing, "traced anew in each frame" if tracing else other),
-                Step("rays that miss", lost, "see the scene's environment" if lost else "see the background"),
-            )
-        )
+        missing = Step("rays that miss", lost, "see the scene's environment" if lost else "see the background")
+        return Explanation((direct, *explained(self.part, self.method), missing))
 
     @functools.cached_property
     def rays(self) -> MirrorRays:

@@ -19,16 +19,16 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.orthographic import Orthographic
-from mpcam.cameras.pose import look_at
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, pixels_per_radius, place, texel_direction
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import DirectionalLight, Light, PointLight, Scene
-from mpcam.rendering.device import opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.math.pose import look_at
+from mpcam.rendering.methods import depth_map
 from mpcam.rendering.shade import check_shadow_shading
+from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
 
 SLACK, SLACK_WITHOUT_NORMALS = 1.0, 3.0  # widths of a texel
 MARGIN = 2  # texels around what an orthographic map shows
@@ -190,8 +190,6 @@ def shadow_map(scene: Any, light: Light, size: int = 1024) -> ShadowMap:
     scene: a Scene, a Mesh or several meshes. light: need not be one of the scene's. size: pixels along a side, of the
     longer one for parallel light; 8 to 16384. Raises InputError.
     """
-    from mpcam.rendering.maps import depth_map
-
     if not isinstance(light, Light):
         raise InputError(f"light is a {type(light).__name__}: give a PointLight or a DirectionalLight")
     size, mesh = check_size(size), Scene.of(scene).mesh

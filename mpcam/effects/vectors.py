@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import shown
 
 
 def as_vectors(values: Any, name: str, unit: bool = False) -> np.ndarray:

@@ -11,18 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras import three_rays
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.pose import frame_origin
 from mpcam.cameras.types import Ray
 from mpcam.decomposition.decompose import directions_at_vertices
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.camera_triangle_rays import corner_rays
-from mpcam.rendering.device import opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 
 
@@ -77,8 +76,8 @@ class VirtualVertices(VertexProjected):
         for pairs, number in met:
             keys = nearest(threads(t, 0, number), pairs, points, self.rays, keys)
         target = dr.empty(t.Float, 4 * total)
-        lens = (self.lens.on_device, self.pose, self.unit)
-        return [pixels(every, keys, points, self.rays, self.order, target, *lens)]
+        eye = (self.device_camera.on_device, self.pose, self.unit)
+        return [pixels(every, keys, points, self.rays, self.order, target, *eye)]
 
 
 def with_directions(cams: CameraTriangles) -> CameraTriangles:

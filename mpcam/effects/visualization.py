@@ -10,14 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mpcam.backend import exclusive, types
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.pose import as_pose
+from mpcam.checks import is_number, shown, whole_number
 from mpcam.effects.vectors import as_vector
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import shown
-from mpcam.geometry.scene import DirectionalLight, Scene
-from mpcam.rendering.device import types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.math.pose import as_pose
+from mpcam.scene.scene import DirectionalLight, Scene
 
 MOST = 1_000
 """Columns or rows at most."""
@@ -55,8 +54,7 @@ def surround(
     if angle > TURN * (1 + 1e-12):
         raise InputError(f"surround(angle={angle:g}): radians, at most 2 pi")
     for name, value in (("columns", columns), ("rows", rows)):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST:
-            raise InputError(f"surround({name}={shown(value)}): give a whole number from 1 to {MOST}")
+        whole_number(name, value, 1, MOST, of="surround")
     wraps = angle > TURN * (1 - 1e-12)
     if wraps and columns < 3:
         raise InputError(f"surround(columns={columns}): a full turn takes 3 at least, or give a smaller angle")
@@ -152,7 +150,7 @@ class Unrolled:
     @functools.cached_property
     @exclusive
     def _number(self) -> Any:
-        from mpcam.rendering.device import opaque_zero
+        from mpcam.backend import opaque_zero
 
         return types().UInt(self.pixel.ravel()) + types().UInt(opaque_zero())
 
@@ -205,8 +203,7 @@ def walker_scene(triangles: int = 6_841) -> Scene:
     from mpcam.geometry.shapes import Builder, copies, lathe, placements, quads
     from mpcam.geometry.textures import painted, plaster, textured
 
-    if isinstance(triangles, bool) or not isinstance(triangles, (int, np.integer)) or not 3_000 <= triangles <= 200_000:
-        raise InputError(f"walker_scene({shown(triangles)}): give a whole number from 3,000 to 200,000")
+    triangles = whole_number("triangles", triangles, 3_000, 200_000, of="walker_scene")
     builder = Builder()
     corners = np.array([(-9.0, -9.0, 0.0), (9.0, -9.0, 0.0), (9.0, 9.0, 0.0), (-9.0, 9.0, 0.0)])
     builder.add(quads(corners, corners[:, :2] / 3.0), textured("ground", plaster("#b7b09c", 51, contrast=0.07)))
@@ -241,6 +238,5 @@ def _pair(name: str, value: Any) -> np.ndarray:
 
 
 def _number(name: str, value: Any, above: bool = False) -> None:
-    fits = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and np.isfinite(value)
-    if not fits or (above and value <= 0):
+    if not is_number(value) or (above and value <= 0):
         raise InputError(f"surround({name}={shown(value)}): give a finite number{' above 0' if above else ''}")

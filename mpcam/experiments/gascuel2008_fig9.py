@@ -25,9 +25,10 @@ from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.gascuel2008_paper import TABLE_3
 from mpcam.experiments.pixel_counts import SQUARE, counts, local_corners
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Report, Table
-from mpcam.geometry.builtin import builtin_scene
-from mpcam.io.srgb import linear_from_srgb
-from mpcam.rendering.methods import prepare, rasterize, render
+from mpcam.math.srgb import linear_from_srgb
+from mpcam.pictures.render import render
+from mpcam.rendering.methods import prepare, rasterize
+from mpcam.scene.builtin import builtin_scene
 
 SIZE, TRIANGLES, QUICK_TRIANGLES, ROUNDS = 512, 177_000, 25_000, 21
 WANTED = ("triangle", "quad", "tight")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mpcam.comparison import timing
-from mpcam.comparison.driver import moving_frame, moving_vertices
+from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.experiments.common import CARD, PAPER, STAND_IN, WARMUP, machine, measured, rounds
 from mpcam.experiments.figures import plain_ticks
@@ -12,9 +12,9 @@ from mpcam.experiments.gascuel2008_paper import GROWTH
 from mpcam.experiments.moving_scene import METHODS, wavy_sphere
 from mpcam.experiments.peak_memory import peak_megabytes
 from mpcam.experiments.results import Column, Plot, Report, Table, as_number
-from mpcam.geometry.builtin import builtin_scene
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade_device
+from mpcam.scene.builtin import builtin_scene
 
 TRIANGLES = (80, 320, 1280, 5120, 20480, 81920, 327680, 1310720)
 SIDES = (128, 256, 512, 1024, 2048, 4096)

@@ -23,11 +23,11 @@ from mpcam.experiments.common import (
 )
 from mpcam.experiments.gascuel2008_paper import TABLE_2
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Report, Table
-from mpcam.geometry.builtin import builtin_scene
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.cubemap import face_cameras
 from mpcam.rendering.methods import prepare, rasterize
 from mpcam.rendering.shade import shade, shade_device
+from mpcam.scene.builtin import builtin_scene
+from mpcam.scene.scene import Scene
 
 TRIANGLES, SIZES, ROUNDS = 1900, (512, 16), 21
 OUTPUTS = ("color", "depth", "coverage")

@@ -27,10 +27,10 @@ from mpcam.experiments.common import (
 )
 from mpcam.experiments.gascuel2008_table3_pages import gallery, overdraw_plot, overdraw_table, steps_plot, steps_table
 from mpcam.experiments.results import Report
-from mpcam.geometry.builtin import builtin_scene
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.methods import prepare, rasterize
 from mpcam.rendering.shade import shade_device
+from mpcam.scene.builtin import builtin_scene
+from mpcam.scene.scene import Scene
 
 SIZE, TINY, ROUNDS = 512, 8, 9
 PROJECTIONS = {

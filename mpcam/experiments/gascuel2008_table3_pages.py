@@ -112,7 +112,7 @@ def steps_plot(rows: Rows) -> Plot:
 
 def gallery(scenes: dict[tuple[str, int], Any]) -> Gallery:
     """Fig. 8: the larger scenes; the last of each name stands for it."""
-    from mpcam.rendering.methods import render
+    from mpcam.pictures.render import render
 
     pictures = []
     for name, scene in {name: scene for (name, _), scene in scenes.items()}.items():

@@ -1,16 +1,14 @@
 """Hou et al. 2006, Figs. 1 and 6: quality of a mirror against tessellation, beside other methods and ray tracing."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
-from mpcam.comparison.driver import moving_vertices
 from mpcam.comparison.metrics import flip_map, image_rmse, psnr
 from mpcam.comparison.mirrors import FINE
+from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.plan import LEVELS as HALVINGS
 from mpcam.comparison.progress import Progress, Steps
@@ -20,25 +18,23 @@ from mpcam.effects.reflection import Reflection
 from mpcam.effects.shadows import shadow_maps
 from mpcam.experiments import hou2006_paper as paper
 from mpcam.experiments.common import WARMUP, machine, measured, rounds
-from mpcam.experiments.hou2006_fig6_pages import error_plot, gallery, quality_table, slope_table, time_plot
+from mpcam.experiments.hou2006_fig6_pages import (
+    MirrorPicture,
+    error_plot,
+    gallery,
+    quality_table,
+    slope_table,
+    time_plot,
+)
 from mpcam.experiments.hou2006_scenes import SHAPES, reflection_scene, smaller
 from mpcam.experiments.results import Report
-from mpcam.geometry.scene import Scene
+from mpcam.scene.scene import Scene
 
 ROUNDS = 7
 SIZES = (64, 128, 256, 512, 1024)
 """Pixels along a side of each of the two views of an environment map."""
 LEVELS = ((26, 128), (52, 90), (104, 64), (208, 45), (416, 32), (1664, 16))
 """Camera triangles and their resolution: about as many pixels in all."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """A mirror by one method: its row, its picture, and what makes frames."""
-
-    row: dict[str, Any]
-    image: np.ndarray
-    picture: Reflection
 
 
 def tessellations(scene: Scene, quick: bool) -> list[CameraTriangles]:
@@ -63,7 +59,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     number = 1 + len(sizes) + len(_halvings(quick)) + len(_levels(quick))
     steps = Steps(progress, len(SHAPES) * (1 + number * (1 + 2 * (1 + WARMUP + count))) + 1)
     rows: list[dict[str, Any]] = []
-    shown: dict[str, list[Shown]] = {}
+    shown: dict[str, list[MirrorPicture]] = {}
     for shape in SHAPES:
         scene = reflection_scene(shape)
         scene = smaller(scene) if quick else scene
@@ -109,7 +105,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps: Steps) -> list[Shown]:
+def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps: Steps) -> list[MirrorPicture]:
     """The mirror by every method, the truth first."""
     assert scene.mirror is not None
     maps = shadow_maps(scene, 256 if quick else 2048)
@@ -118,14 +114,14 @@ def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps:
     mask = truth.mask & (np.asarray(truth.direct.frame().depth) > truth.rays.distance.reshape(truth.mask.shape))
     start = {"mirror": shape}
     first = start | {"method": "ray tracing", "setting": "", "flip": 0.0, "psnr": float("inf")}
-    found = [Shown(first, image, truth)]
+    found = [MirrorPicture(first, image, truth)]
     steps.done(f"{shape}, truth")
 
     def add(picture: Reflection, **row: Any) -> None:
         ours = picture.image()
         rmse = image_rmse(ours[mask], image[mask])
         errors = {"flip": float(flip_map(ours, image)[mask].mean()), "psnr": psnr(rmse)}
-        found.append(Shown(start | row | errors, ours, picture))
+        found.append(MirrorPicture(start | row | errors, ours, picture))
         steps.done(f"{shape}, {row['setting']}")
 
     for size in sizes:
@@ -159,13 +155,13 @@ def edge_length(cams: CameraTriangles) -> float:
     return float(np.sqrt(np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=-1).mean()))
 
 
-def _time(shown: list[Shown], scene: Scene, count: int, steps: Steps) -> None:
+def _time(shown: list[MirrorPicture], scene: Scene, count: int, steps: Steps) -> None:
     """Put the times of still and moving pictures into the rows, and which rows are on the front."""
     calls = {f"{i} still": one.picture.frame for i, one in enumerate(shown)}
     mirror = shown[0].row["mirror"]
     still = timing.measure(calls, count, WARMUP, on_call=lambda _: steps.done(f"{mirror}, still"))
     positions = moving_vertices(scene.mesh)
-    calls = {f"{i} moving": _moving(one.picture, positions) for i, one in enumerate(shown)}
+    calls = {f"{i} moving": moving_frame(one.picture, positions) for i, one in enumerate(shown)}
     moving = timing.measure(calls, count, WARMUP, on_call=lambda _: steps.done(f"{mirror}, moving"))
     for i, one in enumerate(shown):
         one.row["still_ms"], one.row["moving_ms"] = 1e3 * still[f"{i} still"].median, 1e3 * moving[f"{i} moving"].median
@@ -174,19 +170,6 @@ def _time(shown: list[Shown], scene: Scene, count: int, steps: Steps) -> None:
         front = pareto_front([one.row["flip"] for one in shown], times)
         for one, on in zip(shown, front, strict=True):
             one.row[f"{kind}_front"] = "yes" if on else ""
-
-
-def _moving(picture: Reflection, positions: tuple[np.ndarray, ...]) -> Callable[[], object]:
-    """A picture that starts with new vertices."""
-    number = 0
-
-    def frame() -> object:
-        nonlocal number
-        number += 1
-        picture.update(positions[number % len(positions)])
-        return picture.frame()
-
-    return frame
 
 
 def _slope(shape: str, rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,20 +1,28 @@
 """Tables, plots and pictures of Hou et al. 2006, Fig. 6."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mpcam.comparison.metrics import flip_map
+from mpcam.effects.reflection import Reflection
 from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Table
-from mpcam.io.srgb import linear_from_srgb
-
-if TYPE_CHECKING:
-    from mpcam.experiments.hou2006_fig6 import Shown
+from mpcam.math.srgb import linear_from_srgb
 
 Rows = list[dict[str, Any]]
 METHODS = ("camera triangles", "environment map", "ray tracing", "vertices")
 MARKS = ("o", "s", "D", "^")
+
+
+@dataclass(frozen=True, eq=False)
+class MirrorPicture:
+    """A mirror by one method: its row, its picture, and what makes frames."""
+
+    row: dict[str, Any]
+    image: np.ndarray
+    picture: Reflection
 
 
 def quality_table(rows: Rows) -> Table:
@@ -118,7 +126,7 @@ def error_plot(rows: Rows) -> Plot:
     return Plot("errors", caption, "Curves of ray error against edge length, and of FLIP against triangles", draw)
 
 
-def gallery(shown: "list[Shown]", name: str, title: str) -> Gallery:
+def gallery(shown: "list[MirrorPicture]", name: str, title: str) -> Gallery:
     """The truth, an environment map, vertices and tessellations, each above its difference from the truth."""
     truth = shown[0]
     environment = [one for one in shown if one.row["method"] == "environment map"][-2:-1]
@@ -139,7 +147,7 @@ def gallery(shown: "list[Shown]", name: str, title: str) -> Gallery:
     return Gallery(title, tuple(pictures), note)
 
 
-def _wanted(cams: "list[Shown]", count: int) -> set[int]:
+def _wanted(cams: "list[MirrorPicture]", count: int) -> set[int]:
     """So many numbers of camera triangles, from the first to the last, about evenly."""
     numbers = [one.row["camera_triangles"] for one in cams]
     return {numbers[round(i)] for i in np.linspace(0, len(numbers) - 1, min(count, len(numbers)))}

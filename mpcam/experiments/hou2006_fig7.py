@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
-from mpcam.comparison.driver import moving_frame
+from mpcam.comparison.motion import moving_frame
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.decomposition.decompose import decompose
 from mpcam.effects.reflection import Reflection

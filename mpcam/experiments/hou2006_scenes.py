@@ -10,16 +10,16 @@ import numpy as np
 
 from mpcam.cameras.change import resized
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.cameras.pose import look_at
 from mpcam.effects.environment import EnvironmentMap
 from mpcam.errors import InputError
 from mpcam.experiments.hou2006_solids import ball, box, cone, octahedron, placed, plane, prism
 from mpcam.geometry.mesh import Material
-from mpcam.geometry.mirror import Mirror
-from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
 from mpcam.geometry.shapes import Builder, quads
 from mpcam.geometry.surfaces import Surface
 from mpcam.geometry.textures import bricks, noise, painted, planks, plaster, rgb, textured, tiles
+from mpcam.math.pose import look_at
+from mpcam.scene.mirror import Mirror
+from mpcam.scene.scene import DirectionalLight, PointLight, Scene
 
 SHAPES = ("mixed", "convex", "concave")
 """Of the mirror of the reflection scene."""

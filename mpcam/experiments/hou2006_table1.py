@@ -1,23 +1,29 @@
 """Hou et al. 2006, Table 1: pixels that each bound tests, and whole frames against a rebuilt tree and traced rays."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
-from mpcam.comparison.driver import moving_frame, moving_vertices
+from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.decomposition.decompose import decompose, subdivided
 from mpcam.experiments import hou2006_paper as paper
 from mpcam.experiments.common import RENDERED, WARMUP, WRONG, machine, measured, mismatch, rounds, wrong_pixels
 from mpcam.experiments.hou2006_scenes import caustics_scene, light_of, reflection_scene, refraction_scene, smaller
-from mpcam.experiments.hou2006_table1_pages import gallery, overdraw_plot, overdraw_table, times_plot, times_table
+from mpcam.experiments.hou2006_table1_pages import (
+    ThroughTriangles,
+    gallery,
+    overdraw_plot,
+    overdraw_table,
+    times_plot,
+    times_table,
+)
 from mpcam.experiments.results import Report
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.methods import prepare
+from mpcam.scene.scene import Scene
 
 BOUNDS = ("tight", "nine_point", "triangle")
 ROUNDS = 11
@@ -26,21 +32,7 @@ WALKER = 6_680
 """Asked for to get 6,866 triangles, the nearest to the paper's 6,841."""
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A scene through camera triangles. paper: how many of these the paper has, in the row that it stands for."""
-
-    name: str
-    scene: Scene
-    cams: CameraTriangles
-    paper: int
-
-    @property
-    def label(self) -> str:
-        return f"{self.name} × {self.paper}"
-
-
-def cases(quick: bool) -> list[Case]:
+def cases(quick: bool) -> list[ThroughTriangles]:
     """The rows. A quick run has small atlases and coarser surfaces."""
     shrink = 8 if quick else 1
     made = [reflection_scene(), reflection_scene(fine=True), refraction_scene(), caustics_scene()]
@@ -51,13 +43,13 @@ def cases(quick: bool) -> list[Case]:
     through = decompose(water.mirror.surface, water.camera, 12, resolution=128 // shrink, index=water.mirror.index)
     shone = decompose(ring.mirror.surface, light_of(ring).position, 400, resolution=64 // shrink)
     rows = [
-        Case("reflection", plain, coarse, 26),
-        Case("reflection", plain, middle, 104),
-        Case("reflection", plain, finest, 416),
-        Case(FINE, fine, middle, 104),
-        Case("refraction", water, through, 12),
-        Case("caustics", ring, shone, 400),
-        Case("visualization", *walk(64 // shrink, 3_000 if quick else WALKER), 400),
+        ThroughTriangles("reflection", plain, coarse, 26),
+        ThroughTriangles("reflection", plain, middle, 104),
+        ThroughTriangles("reflection", plain, finest, 416),
+        ThroughTriangles(FINE, fine, middle, 104),
+        ThroughTriangles("refraction", water, through, 12),
+        ThroughTriangles("caustics", ring, shone, 400),
+        ThroughTriangles("visualization", *walk(64 // shrink, 3_000 if quick else WALKER), 400),
     ]
     return [row for row in rows if not (quick and (row.name == FINE or row.paper == 416))]
 
@@ -119,7 +111,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def _counted(case: Case, steps: Steps) -> tuple[list[dict[str, Any]], dict[str, Callable[[], object]]]:
+def _counted(case: ThroughTriangles, steps: Steps) -> tuple[list[dict[str, Any]], dict[str, Callable[[], object]]]:
     """A row of counts for each bound, and what is to be timed."""
     mesh, cams = case.scene.mesh, case.cams
     positions = moving_vertices(mesh)

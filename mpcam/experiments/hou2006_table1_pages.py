@@ -1,9 +1,11 @@
 """Tables, plots and pictures of Hou et al. 2006, Table 1."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.effects.reflection import Reflection
 from mpcam.effects.shadows import shadow_maps
 from mpcam.experiments.figures import plain_ticks
@@ -11,9 +13,7 @@ from mpcam.experiments.hou2006_paper import CARD
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Table, as_number
 from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade
-
-if TYPE_CHECKING:
-    from mpcam.experiments.hou2006_table1 import Case
+from mpcam.scene.scene import Scene
 
 Rows = list[dict[str, Any]]
 _FIRST = (
@@ -23,6 +23,20 @@ _FIRST = (
     Column("camera_triangles", "Ours", "", "", "Camera triangles"),
     Column("paper_camera_triangles", "Paper", "", "", "Camera triangles", paper=True, brief=False),
 )
+
+
+@dataclass(frozen=True, eq=False)
+class ThroughTriangles:
+    """A scene through camera triangles. paper: how many of these the paper has, in the row that it stands for."""
+
+    name: str
+    scene: Scene
+    cams: CameraTriangles
+    paper: int
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} × {self.paper}"
 
 
 def overdraw_table(rows: Rows) -> Table:
@@ -113,7 +127,7 @@ def _labels(rows: Rows) -> list[str]:
     return [f"{row['scene']} {row['scene_triangles']:,} × {row['camera_triangles']}" for row in kept]
 
 
-def gallery(cases: "list[Case]", quick: bool) -> Gallery:
+def gallery(cases: "list[ThroughTriangles]", quick: bool) -> Gallery:
     """Figs. 9, 11 and 12, and the mirror: ours, and the same by rays of the true surface."""
     pictures = []
     for case in cases:
@@ -133,7 +147,7 @@ def gallery(cases: "list[Case]", quick: bool) -> Gallery:
     return Gallery("The scenes", tuple(pictures), note)
 
 
-def _caustics(case: "Case", quick: bool) -> Picture:
+def _caustics(case: ThroughTriangles, quick: bool) -> Picture:
     """The light that the ring gathers on the table, and the ring as the mirror that it is."""
     from mpcam.effects.caustics import caustics
     from mpcam.experiments.hou2006_scenes import light_of
@@ -155,7 +169,7 @@ def _caustics(case: "Case", quick: bool) -> Picture:
     return Picture("caustics", f"Caustics of half a ring, {found.cams.count} camera triangles from the lamp", image)
 
 
-def _panorama(case: "Case", quick: bool) -> Picture:
+def _panorama(case: ThroughTriangles, quick: bool) -> Picture:
     from mpcam.effects.visualization import unrolled
 
     maps = shadow_maps(case.scene, 256 if quick else 2048)

@@ -8,16 +8,16 @@ import functools
 import numpy as np
 
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.cameras.pose import look_at
 from mpcam.errors import InputError
 from mpcam.experiments.hou2006_scenes import AMBIENT, SUN, checker, sky
 from mpcam.experiments.hou2006_solids import Solid, ball, prism
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.mirror import Mirror
-from mpcam.geometry.scene import Scene
 from mpcam.geometry.shapes import copies as copied
 from mpcam.geometry.shapes import join, lathe, loft, placements, smooth_curve
 from mpcam.geometry.textures import painted, textured
+from mpcam.math.pose import look_at
+from mpcam.scene.mirror import Mirror
+from mpcam.scene.scene import Scene
 
 EACH = 20
 """Triangles of an object."""

@@ -52,7 +52,7 @@ def _unrolled(prepared: Inverted, triangles: int) -> Any:
     """A frozen kernel that tests all pixels against all triangles, set-ups as literals, nearest in registers."""
     import drjit as dr
 
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
     from mpcam_kernels import central
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.pixels import PER_THREAD

@@ -13,9 +13,9 @@ from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.inner_loop import measure_loop
 from mpcam.experiments.moving_scene import wavy_sphere
 from mpcam.experiments.results import Column, Report, Table
-from mpcam.geometry.builtin import builtin_scene
-from mpcam.geometry.scene import Scene
 from mpcam.rendering.invert import Inverted
+from mpcam.scene.builtin import builtin_scene
+from mpcam.scene.scene import Scene
 
 ROUNDS = 21
 LESS = {"triangle numbers (depth alone)": "depth", "depths too (coverage alone)": "coverage"}
@@ -93,10 +93,10 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
     """A frame of a scene without a part."""
     import drjit as dr
 
+    from mpcam.backend import types
     from mpcam.cameras.outline import without_lines
     from mpcam.rendering import outlines
     from mpcam.rendering.buffered import kernel_test
-    from mpcam.rendering.device import types
     from mpcam_kernels.pipeline import SMALL, Pipeline
     from mpcam_kernels.regions import Outline
 
@@ -131,7 +131,7 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
 
     def frame() -> None:
         rows = prepared.place(prepared.vertices)
-        keys, _ = kernels.frame(prepared.lens.on_device, rows, prepared.faces, prepared.samples)
+        keys, _ = kernels.frame(prepared.device_camera.on_device, rows, prepared.faces, prepared.samples)
         dr.eval(keys)
 
     return frame

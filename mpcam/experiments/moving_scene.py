@@ -10,9 +10,10 @@ from mpcam.comparison.progress import Progress
 from mpcam.experiments.common import machine, measured, rounds
 from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.results import Column, Plot, Report, Table
-from mpcam.geometry.builtin import builtin_mesh, builtin_scene
+from mpcam.geometry.builtin import builtin_mesh
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
+from mpcam.scene.builtin import builtin_scene
+from mpcam.scene.scene import Scene
 
 LEVELS, BUILT_IN, SIZE, ROUNDS = (80, 1280, 20480, 327680), ("facade", "temple", "characters", "patio"), 512, 31
 METHODS = ("invert", "raytrace")

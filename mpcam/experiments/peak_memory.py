@@ -45,7 +45,7 @@ def own_peak() -> float:
 def main(path: str, method: str, size: int) -> float:
     """Render the frames; returns the peak."""
     from mpcam.cameras.radial import Radial
-    from mpcam.comparison.driver import moving_frame, moving_vertices
+    from mpcam.comparison.motion import moving_frame, moving_vertices
     from mpcam.comparison.timing import synchronize
     from mpcam.rendering.methods import prepare
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.comparison.numbers import format_number
-from mpcam.comparison.table import json_number
+from mpcam.comparison.numbers import format_number, json_number
 
 Row = Mapping[str, Any]
 """Cells by the name of their column: text, numbers, or None."""

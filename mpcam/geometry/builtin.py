@@ -1,33 +1,30 @@
-"""The built-in meshes and scenes: the four of Gascuel et al. 2008, section 5.1, made procedurally, and plain shapes."""
+"""The built-in meshes: the four of Gascuel et al. 2008, section 5.1, made procedurally, and plain shapes."""
 
 from importlib import import_module
 from typing import NamedTuple
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
-from mpcam.geometry.scene import DirectionalLight, Scene
+from mpcam.geometry.mesh import Mesh
 
 
 class _Recipe(NamedTuple):
-    """Where a mesh is made, how many triangles it may have, and the view that shows it."""
+    """Where a mesh is made, and how many triangles it may have."""
 
     module: str
     default: int
     fewest: int
     most: int
-    eye: tuple[float, float, float] = (0.0, 0.0, 1.6)
-    target: tuple[float, float, float] = (1.0, 0.0, 1.6)
-    sun: tuple[float, float, float] = (0.4, 0.5, -0.8)
 
 
 _RECIPES = {
-    "facade": _Recipe("facade", 2_800, 600, 4_900, target=(1.0, 0.0, 1.95), sun=(0.25, 0.42, -0.87)),
-    "temple": _Recipe("temple", 4_000, 2_200, 100_000, target=(1.0, 0.0, 2.1)),
-    "characters": _Recipe("characters", 177_000, 25_000, 2_000_000, target=(0.0, 1.0, 1.25), sun=(-0.4, 0.5, -0.75)),
-    "patio": _Recipe("patio", 560_000, 60_000, 3_000_000, target=(1.0, 0.25, 1.9)),
-    "sphere": _Recipe("plain", 1_280, 20, 1_310_720, eye=(0.0, -1.25, 0.0), target=(0.0, 0.0, 0.0)),
-    "plane": _Recipe("plain", 2, 2, 2_000_000, eye=(0.0, -0.35, 0.5), target=(0.0, 0.0, 0.0)),
-    "cube": _Recipe("plain", 12, 12, 1_200_000, eye=(-1.3, -1.7, 1.4), target=(0.0, 0.0, 0.0)),
+    "facade": _Recipe("facade", 2_800, 600, 4_900),
+    "temple": _Recipe("temple", 4_000, 2_200, 100_000),
+    "characters": _Recipe("characters", 177_000, 25_000, 2_000_000),
+    "patio": _Recipe("patio", 560_000, 60_000, 3_000_000),
+    "sphere": _Recipe("plain", 1_280, 20, 1_310_720),
+    "plane": _Recipe("plain", 2, 2, 2_000_000),
+    "cube": _Recipe("plain", 12, 12, 1_200_000),
     "quad_room": _Recipe("plain", 12, 12, 1_200_000),
 }
 
@@ -67,24 +64,6 @@ class BuiltinMesh:
 
 
 builtin_mesh = BuiltinMesh()
-
-
-def builtin_scene(name: str, width: int = 512, height: int = 512, triangles: int | None = None) -> Scene:
-    """The mesh of that name with a paraboloid camera (180 degrees) in a good place, a sun, and a blue sky behind.
-
-    width, height: pixels. triangles: see builtin_mesh. Raises InputError as builtin_mesh does.
-    """
-    from mpcam.cameras import Radial, look_at
-
-    recipe = _recipe(name)
-    return Scene(
-        (builtin_mesh(name, triangles),),
-        camera=Radial.paraboloid(width, height, camera_from_world=look_at(recipe.eye, recipe.target)),
-        lights=(DirectionalLight(recipe.sun, (0.8, 0.77, 0.7)),),
-        ambient=(0.28, 0.3, 0.34),
-        background=(0.33, 0.55, 0.86),
-        name=name,
-    )
 
 
 def _recipe(name: str) -> _Recipe:

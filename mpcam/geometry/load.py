@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
 from mpcam.geometry.load_image import linear_texture
 from mpcam.geometry.load_obj import load_obj
-from mpcam.geometry.mesh import Material, Mesh, shown
-from mpcam.io.srgb import linear_from_srgb
+from mpcam.geometry.mesh import Material, Mesh
+from mpcam.math.srgb import linear_from_srgb
 
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
 _COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from mpcam.errors import InputError
-from mpcam.io.srgb import linear_from_srgb
+from mpcam.math.srgb import linear_from_srgb
 
 
 def linear_texture(image) -> np.ndarray:

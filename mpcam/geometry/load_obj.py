@@ -13,7 +13,7 @@ import numpy as np
 from mpcam.errors import InputError
 from mpcam.geometry.load_image import read_texture
 from mpcam.geometry.mesh import Material, Mesh
-from mpcam.io.srgb import linear_from_srgb
+from mpcam.math.srgb import linear_from_srgb
 
 # how many values follow each option of a map_Kd line
 _MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
 
 
@@ -229,12 +230,6 @@ class Mesh:
             uv=None if self.uv is None else self.uv[index],
             colors=None if self.colors is None else self.colors[index],
         )
-
-
-def shown(value) -> str:
-    """A value as it appears in an error message: one line, not too long."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

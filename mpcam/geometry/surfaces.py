@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.checks import shown, whole_number
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.shapes import surface, unit
 
 MOST = 20_000_000
@@ -76,8 +77,7 @@ class Surface:
 
         uv holds the parameters. Raises InputError for counts that are not whole numbers from 12 to 20,000,000.
         """
-        if isinstance(triangles, bool) or not isinstance(triangles, (int, np.integer)) or not 12 <= triangles <= MOST:
-            raise InputError(f"triangles={shown(triangles)}: give a whole number from 12 to {MOST:,}")
+        triangles = whole_number("triangles", triangles, 12, MOST)
         steps = np.linspace(0, 1, 65)
         u, v = np.meshgrid(steps, steps, indexing="ij")
         place = self._place(u, v)
@@ -101,7 +101,7 @@ class Surface:
 
     def transformed(self, matrix: Any) -> "Surface":
         """The surface after a rigid 4x4 matrix (world from world). Raises InputError for other matrices."""
-        from mpcam.cameras.pose import as_pose
+        from mpcam.math.pose import as_pose
 
         return dataclasses.replace(self, world_from_surface=as_pose(matrix) @ self.world_from_surface)
 

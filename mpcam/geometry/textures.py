@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from mpcam.geometry.mesh import Material
-from mpcam.io.srgb import linear_from_srgb
+from mpcam.math.srgb import linear_from_srgb
 
 
 def rgb(code: str) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.errors import InputError
 from mpcam.io.openimageio import StoredImage
-from mpcam.io.srgb import linear_from_srgb, srgb_from_linear
+from mpcam.math.srgb import linear_from_srgb, srgb_from_linear
 
 
 @dataclass(frozen=True)

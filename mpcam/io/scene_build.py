@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from mpcam.geometry.mesh import Material, Mesh
-from mpcam.geometry.scene import DirectionalLight, Light, PointLight, Scene
 from mpcam.io.images import read_image
 from mpcam.io.scene_camera import build_camera, default_camera
 from mpcam.io.scene_mirror import build_mirror
 from mpcam.io.scene_place import color, placement
 from mpcam.io.scene_tables import DirectionalTable, EnvironmentTable, MeshTable, PointTable, SceneTable
 from mpcam.io.scene_text import SceneText
+from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
 
 
 def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> Scene:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni, look_at
+from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni
 from mpcam.cameras.profiles import PROFILES
 from mpcam.errors import InputError
 from mpcam.io.scene_tables import (
@@ -19,6 +19,7 @@ from mpcam.io.scene_tables import (
     UnifiedOmniTable,
 )
 from mpcam.io.scene_text import SceneText
+from mpcam.math.pose import look_at
 
 # Half the angle that the meshes may take up: near enough for a fisheye to show its curvature, and outside of them.
 _WIDEST = math.radians(65)

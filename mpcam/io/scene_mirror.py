@@ -5,11 +5,11 @@ import math
 from pathlib import Path
 from typing import Any
 
-from mpcam.geometry.mirror import Mirror
 from mpcam.geometry.surfaces import Surface
 from mpcam.io.scene_place import color, placement
 from mpcam.io.scene_tables import MirrorTable
 from mpcam.io.scene_text import SceneText
+from mpcam.scene.mirror import Mirror
 
 _SHAPE = ("radius", "radii", "ring", "tube", "height", "length", "angle", "size", "waves")
 

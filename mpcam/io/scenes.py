@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.errors import InputError
-from mpcam.geometry.scene import Scene
 from mpcam.io.scene_build import bounds_of, build_scene, default_light
 from mpcam.io.scene_camera import default_camera
 from mpcam.io.scene_tables import CompareTable, SceneTable
 from mpcam.io.scene_text import SceneText
+from mpcam.scene.scene import Scene
 
 _VERTICAL_Z = (".stl",)  # what mesh files of this kind are usually modelled with; the others have y up
 
@@ -47,7 +47,8 @@ def load_scene(path_or_name) -> SceneFile:
     ./name. Raises InputError for names that are neither, for mesh files that cannot be read, and for mistakes in a
     TOML file, which are reported as file:line: key = value: what is allowed.
     """
-    from mpcam.geometry.builtin import builtin_mesh, builtin_scene
+    from mpcam.geometry.builtin import builtin_mesh
+    from mpcam.scene.builtin import builtin_scene
 
     if isinstance(path_or_name, str) and path_or_name in builtin_mesh.names:
         return SceneFile(builtin_scene(path_or_name))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import types
 from mpcam.cameras.atlas import Atlas
 from mpcam.geometry.order import interleaved
-from mpcam.rendering.device import types
 from mpcam_kernels.ray_blocks import GROUP, SIDE, place_in_group
 from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH, in_block
 

@@ -2,18 +2,22 @@
 
 import functools
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.outline import HIDDEN
+from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import Lens, device_mesh, lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats, View
+from mpcam.rendering.device import device_mesh
+from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.explanation import Step
+from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
 
@@ -67,20 +71,30 @@ class Buffered:
     bound: str = "tight"
     output: str = "hits"
     cull: str = "none"
-    view: Callable[[], View] | None = None
+    view: Callable[[], PosedRays] | None = None
 
     @exclusive
-    def __init__(self, camera: Camera, mesh: Mesh, test: str):
+    def __init__(self, camera: Camera, mesh: Mesh):
+        self.mesh, self.device = mesh, device_mesh(mesh)
+        self.vertices, self.faces = self.device.vertices, self.device.faces
+        self.unit = opaque_numbers([self.device.scale])[0]
+        self.aim(camera)
+
+    @exclusive
+    def aim(self, camera: Camera) -> None:
+        """Another camera, or another pose of it: the scene stays as it is. Raises InputError as at the beginning."""
+        test = self.test_for(camera)
         if max(camera.width, camera.height) > MOST_PIXELS:
             size = f"{camera.width}x{camera.height}"
             raise InputError(f"the camera has {size} pixels: at most {MOST_PIXELS} along a side are possible")
-        self.camera, self.mesh, self.test, self.curved = camera, mesh, test, test == "central"
-        self.device = device_mesh(mesh)
-        self.vertices, self.faces = self.device.vertices, self.device.faces
-        self.lens: Lens = lens(camera)
-        self.samples = self.lens.directions if self.curved else self.lens.centres
+        self.camera, self.test, self.curved = camera, test, test == "central"
+        self.device_camera = device_camera(camera)
+        self.samples = self.device_camera.directions if self.curved else self.device_camera.centres
         self.pose = self.device.pose(camera.camera_from_world)
-        self.unit = opaque_numbers([self.device.scale])[0]
+
+    def test_for(self, camera: Camera) -> str:
+        """The test that serves a camera; raises InputError where none does."""
+        raise TypeError(f"{type(self).__name__} must define test_for")
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
@@ -137,7 +151,7 @@ class Buffered:
 
         camera, model, static = None, None, ()
         if self.curved:
-            camera, model = self.lens.on_device, type(self.camera)
+            camera, model = self.device_camera.on_device, type(self.camera)
             static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         size = (self.camera.width, self.camera.height)
         outline = self.bound if self.curved else "straight"
@@ -157,13 +171,54 @@ class Buffered:
         clock.done("decode")
         return clock.seconds
 
+    @exclusive
+    def explain(self) -> tuple[Step, ...]:
+        """Which stages a frame takes, which are left out, and why; takes one frame to find out."""
+        return tuple(self._steps())
+
+    def _steps(self) -> Iterator[Step]:
+        seen: dict[str, Any] = {}
+        positions = self.place(self.vertices) if self.mesh.triangle_count else []
+        if not positions:
+            yield Step("rasterization", False, "the mesh has no triangles")
+            return
+        self.run(positions, seen.__setitem__)
+        vertices, triangles = len(positions[0].numpy()) // 4, self.triangle_count
+        yield Step("vertices", True, f"{vertices:,} brought to the camera")
+        outlined = self.curved and len(positions) > 1
+        lens = f"{vertices:,}: what each knows of the projection, so that triangles need no profile"
+        why = lens if outlined else f"the bound {self.bound!r} is worked out triangle by triangle"
+        yield Step("projection around vertices", outlined, why if self.curved else "edges are straight in the image")
+        hidden = self._hidden(positions) if outlined else 0
+        culled = "" if self.cull == "none" else f", and those that show their {self.cull}"
+        yield Step(
+            "triangles", True, f"{triangles - hidden:,} bounded; left out: {hidden:,} that no pixel can see{culled}"
+        )
+        large = int(seen["triangles"][1].count[0])
+        few = f"{large:,} of more pixels than a lane walks by itself"
+        yield Step(
+            "lists of blocks", "lists" in seen, few if large else "no triangle covers more than a lane walks by itself"
+        )
+        yield Step("pixels through lists", "pixels" in seen, "nearest of each list" if large else "there are no lists")
+        wanted = {"hits": "triangle and depth", "depth": "depth alone", "coverage": "coverage alone"}[self.output]
+        yield Step("decode", True, f"{wanted} of each pixel")
+        yield Step(
+            "root finding", False, "a pixel's ray is known in closed form or kept per camera, and is met by a plane"
+        )
+        yield Step("tree over the triangles", False, "only method='raytrace' needs one")
+
+    def _hidden(self, positions: list[Any]) -> int:
+        """Triangles whose corners all lie in the convex region that no pixel sees."""
+        place = np.asarray(positions[0].numpy()).reshape(-1, 4)[:, 3]
+        return int((place[self.mesh.faces] >= HIDDEN).all(axis=1).sum())
+
     def _decoded(self, positions: list[Any], keys: Any) -> Any:
         unit = self.unit if self.curved else opaque_one()
         found = _frozen_decode(self.output, self.camera.width)(self.pixels, keys, unit)
         if self.output == "depth":
             return DepthMap(self.camera, found[0])
         if self.output == "coverage":
-            return CoverageMap(self.camera, found[0], self.lens.ray.valid)
+            return CoverageMap(self.camera, found[0], self.device_camera.ray.valid)
         return self._hits(positions, *found)
 
     def _hits(self, positions: list[Any], small: Any, depth: Any) -> Hits:

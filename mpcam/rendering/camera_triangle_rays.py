@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import opaque_numbers, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.math import normalize
 from mpcam.rendering.block_layout import BlockLayout, atlas_layout
-from mpcam.rendering.device import opaque_numbers, types
 from mpcam.rendering.ray_blocks import DeviceRays, bounded
 
 

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.pinhole import Pinhole
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device_camera import device_camera
+from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.invert import Inverted
 
@@ -55,12 +57,22 @@ class Cubemapped:
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
-        if (
-            isinstance(resolution, bool)
-            or not isinstance(resolution, (int, np.integer))
-            or not 1 <= resolution <= 16384
-        ):
-            raise InputError(f"resolution={resolution!r}: a whole number of pixels from 1 to 16384 is needed")
+        resolution = whole_number("resolution", resolution, 1, 16384, unit="pixels")
+        self._check(camera)
+        self.mesh, self.resolution = mesh, resolution
+        self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
+        self.unit = opaque_numbers([self.faces[0].device.scale])[0]
+        self.camera, self.device_camera = camera, device_camera(camera)
+
+    @exclusive
+    def aim(self, camera: Camera) -> None:
+        """Another camera, or another pose of it: the scene stays as it is. Raises InputError as at the beginning."""
+        self._check(camera)
+        for face, view in zip(self.faces, face_cameras(camera, self.resolution, self.half), strict=True):
+            face.aim(view)
+        self.camera, self.device_camera = camera, device_camera(camera)
+
+    def _check(self, camera: Camera) -> None:
         angle = camera.domain.max_angle
         if camera.ray_geometry != "central" or angle is None:
             raise InputError(f"method={self.method!r} needs a camera with one centre, not {type(camera).__name__}")
@@ -68,10 +80,6 @@ class Cubemapped:
             raise InputError(
                 f"method='hemicube' sees 180 degrees, the camera {np.degrees(2 * angle):.0f}: use method='cubemap'"
             )
-        self.camera, self.mesh, self.resolution = camera, mesh, int(resolution)
-        self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
-        self.lens = lens(camera)
-        self.unit = opaque_numbers([self.faces[0].device.scale])[0]
 
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
@@ -95,10 +103,14 @@ class Cubemapped:
         clock.done("resample")
         return clock.seconds
 
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))
+
     def _hits(self, frames: list[tuple[Any, Any]]) -> Hits:
         buffers = [buffer for _, buffer in frames]
         look_up = _frozen_look_up(self.resolution, self.half)
-        ray = self.lens.ray
+        ray = self.device_camera.ray
         triangle, depth, texel = look_up(ray.direction, ray.valid, buffers, self.unit)
 
         def weights() -> tuple[Any, Any]:

@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device import DeviceMesh, device_mesh
+from mpcam.rendering.device_camera import around
+from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.ray_blocks import DeviceRays, device_rays
@@ -69,7 +71,7 @@ class GeneralRasterizer:
                 f"bound={self.bound!r} is for camera triangles, not for a {type(camera).__name__}: use bound='tight'"
             )
         self.camera, self.rays = camera, device_rays(camera, self.device, self.bound != "tight")
-        self.pose = self.device.pose(self.rays.pose(camera))
+        self.pose = self.device.pose(around(camera, self.rays.anchor))
         from mpcam_kernels.candidates import levels
 
         cones = self._cones.items
@@ -114,6 +116,10 @@ class GeneralRasterizer:
         clock.done("decode")
         return clock.seconds
 
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))
+
     def _decoded(self, keys: Any) -> Any:
         slots = self.rays.slots
         found = _frozen_decode(self.output)(slots, keys, self.unit)
@@ -135,7 +141,7 @@ class GeneralRasterizer:
             tests, rendered = self._count(vertices, rays, pose)
             return Stats(int(tests), int(rendered))
 
-        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.view(camera))
+        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.posed(camera))
 
     @exclusive
     def _count(self, vertices: Any, rays: DeviceRays, pose: Any) -> np.ndarray:

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
-from mpcam.cameras.types import Ray
+from mpcam.cameras.types import PosedRays
+from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device_camera import posed_rays
 
 
 @dataclass(frozen=True)
@@ -31,14 +33,6 @@ class Stats:
         return self.tests / self.rendered if self.rendered else float("inf")
 
 
-@dataclass(frozen=True)
-class View:
-    """The rays that hits were found with: on the device, one per pixel, in a frame. pose: 4x4, frame from world."""
-
-    pose: np.ndarray
-    ray: Ray
-
-
 class Hits:
     """First hits of a camera's pixels on a mesh; every field is worked out when it is first asked for.
 
@@ -56,7 +50,7 @@ class Hits:
         depth: Any,
         weights: Callable[[], tuple[Any, Any]],
         stats: Callable[[], Stats],
-        view: Callable[[], View] | None = None,
+        view: Callable[[], PosedRays] | None = None,
     ):
         self.camera, self.mesh, self.method = camera, mesh, method
         self.device_triangle, self.device_depth = triangle, depth
@@ -64,11 +58,11 @@ class Hits:
 
     @cached_property
     @exclusive
-    def view(self) -> View:
+    def view(self) -> PosedRays:
         """The rays; those of the camera unless something else found the hits."""
-        from mpcam.rendering.ray_blocks import lens_view
-
-        return self._view() if self._view else lens_view(self.camera)
+        if self._view:
+            return self._view()
+        return posed_rays(self.camera)
 
     @cached_property
     @exclusive
@@ -108,8 +102,6 @@ class Hits:
     @property
     def points(self) -> np.ndarray:
         """(H, W, 3) float64 world positions of the hits, from the barycentric weights; 0 where nothing is hit."""
-        from mpcam.rendering.interpolate import interpolate
-
         return interpolate(self, self.mesh.vertices)
 
     def _image(self, values: Any) -> np.ndarray:
@@ -118,3 +110,29 @@ class Hits:
     def __repr__(self) -> str:
         size = f"{self.camera.width}x{self.camera.height}"
         return f"Hits({size}, method={self.method!r}, {self.mesh.triangle_count} triangles)"
+
+
+def interpolate(hits: Hits, attribute: np.ndarray) -> np.ndarray:
+    """Attribute of the mesh at every hit, linear on each triangle.
+
+    attribute: (V, C) per vertex or (F, 3, C) per corner. Returns (H, W, C) in the attribute's float type (float64 for
+    integers); 0 where nothing is hit. Raises InputError where the shape fits neither vertices nor faces.
+    """
+    values = np.asarray(attribute)
+    if values.dtype.kind not in "fiu":
+        raise InputError(f"attribute has type {values.dtype}: numbers are needed")
+    mesh, kind = hits.mesh, values.dtype if values.dtype.kind == "f" else np.dtype(np.float64)
+    vertices, faces = len(mesh.vertices), len(mesh.faces)
+    if not (values.ndim == 2 and len(values) == vertices) and values.shape[:2] != (faces, 3):
+        raise InputError(
+            f"attribute has shape {values.shape}: ({vertices}, C) per vertex or ({faces}, 3, C) per corner is needed"
+        )
+    result = np.zeros((*hits.triangle.shape, values.shape[-1]), kind)
+    mask = hits.mask
+    if not mask.any():
+        return result
+    triangle, weights = hits.triangle[mask], hits.barycentric[mask].astype(np.float64)
+    corners = values[mesh.faces[triangle]] if values.ndim == 2 else values[triangle]
+    first = 1.0 - weights[:, :1] - weights[:, 1:]
+    result[mask] = first * corners[:, 0] + weights[:, :1] * corners[:, 1] + weights[:, 1:] * corners[:, 2]
+    return result

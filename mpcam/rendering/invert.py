@@ -3,15 +3,18 @@
 import functools
 from typing import Any
 
+from mpcam.backend import types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Images, Outlines, need
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import to_camera, types
+from mpcam.rendering.device import to_camera
 from mpcam.rendering.outlines import ROWS
 
 BOUNDS = ("tight", "triangle", "quad")
 CULLS = ("none", "back", "front")
+ANEW = "prepare anew, by mpcam.prepare"
 
 
 class Inverted(Buffered):
@@ -32,12 +35,21 @@ class Inverted(Buffered):
             raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
         if cull not in CULLS:
             raise InputError(f"cull={cull!r}: allowed are {', '.join(CULLS)}")
-        if bound != "tight" and not hasattr(camera, f"local_bound_{bound}s"):
-            raise InputError(
-                f"bound={bound!r} is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
-            )
-        super().__init__(camera, mesh, "central" if camera.ray_geometry == "central" else "planar")
         self.bound, self.output, self.cull = bound, output, cull
+        super().__init__(camera, mesh)
+
+    def test_for(self, camera: Camera) -> str:
+        if self.bound != "tight" and not hasattr(camera, f"local_bound_{self.bound}s"):
+            raise InputError(
+                f"bound={self.bound!r} is for radial projections, not for a {type(camera).__name__}: use bound='tight'"
+            )
+        if camera.ray_geometry == "central":
+            need(camera, Outlines, "this prepared frame", ANEW)
+            return "central"
+        need(camera, Images, "this prepared frame", ANEW)
+        if camera.ray_geometry != "parallel":
+            raise InputError(f"this prepared frame is not for the rays of a {type(camera).__name__}: {ANEW}")
+        return "planar"
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
@@ -50,7 +62,7 @@ class Inverted(Buffered):
         model = type(self.camera)
         static = tuple(getattr(self.camera, name) for name in self.camera.static_fields)
         place = _frozen_place(self.curved, model, static if self.curved else (), rows)
-        return place(number, targets, self.lens.on_device, self.pose, self.unit, vertices)
+        return place(number, targets, self.device_camera.on_device, self.pose, self.unit, vertices)
 
 
 @functools.lru_cache(maxsize=64)

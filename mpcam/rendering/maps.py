@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
-from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
-from mpcam.rendering.exclusive import exclusive
 
 OUTPUTS = ("hits", "depth", "coverage")
 
@@ -65,23 +63,3 @@ class CoverageMap:
 
     def __repr__(self) -> str:
         return f"CoverageMap({self.camera.width}x{self.camera.height})"
-
-
-def depth_map(camera: Camera, mesh: Mesh | Scene, **settings: Any) -> DepthMap:
-    """Distance of the first surface along each pixel's ray; finds no triangles and no weights.
-
-    settings: those of method "invert", see `prepare`. Raises InputError.
-    """
-    from mpcam.rendering.methods import prepare
-
-    return prepare(camera, mesh, output="depth", **settings).frame()
-
-
-def coverage_map(camera: Camera, mesh: Mesh | Scene, **settings: Any) -> CoverageMap:
-    """Which pixels see any surface; finds no depths.
-
-    settings: those of method "invert", see `prepare`. Raises InputError.
-    """
-    from mpcam.rendering.methods import prepare
-
-    return prepare(camera, mesh, output="coverage", **settings).frame()

@@ -1,6 +1,5 @@
-"""The methods by name, and the two calls that most users need: `rasterize` and `render`."""
+"""The methods by name: `prepare` for many frames, and `rasterize`, `depth_map` and `coverage_map` for one."""
 
-import sys
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,10 +8,10 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Images, Outlines
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import Scene
+from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits
-from mpcam.rendering.maps import OUTPUTS
-from mpcam.rendering.shade import shade
+from mpcam.rendering.maps import OUTPUTS, CoverageMap, DepthMap
+from mpcam.scene.scene import Scene
 
 METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
 
@@ -24,12 +23,20 @@ class Prepared(Protocol):
         """New positions (V, 3) of the mesh's vertices, world frame."""
         ...
 
+    def aim(self, camera: Camera) -> None:
+        """Another camera of the same kind, or another pose: nothing of the scene is made again."""
+        ...
+
     def frame(self) -> Any:
         """One frame, evaluated on the device: Hits, DepthMap or CoverageMap."""
         ...
 
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
+        ...
+
+    def explain(self) -> tuple[Step, ...]:
+        """Which stages a frame takes, which are left out, and why; takes one frame to find out."""
         ...
 
 
@@ -90,7 +97,7 @@ def _kind(method: str, camera: Camera) -> Any:
 
         return VertexProjected
     if method == "raytrace":
-        from mpcam.truth.raytrace import RayTraced
+        from mpcam.rendering.raytrace import RayTraced
 
         return RayTraced
     from mpcam.rendering.cubemap import Cubemapped, Hemicubed
@@ -109,66 +116,17 @@ def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **sett
     return prepare(camera, mesh, method, **settings).frame()
 
 
-def render(
-    camera: Camera,
-    scene: Any,
-    method: str = "invert",
-    *,
-    shading: str = "light",
-    shadows: bool = False,
-    shadow_size: int = 1024,
-    explain: bool = False,
-    **settings: Any,
-) -> np.ndarray:
-    """An image: (H, W, 3) float32, linear RGB.
+def depth_map(camera: Camera, mesh: Mesh | Scene, **settings: Any) -> DepthMap:
+    """Distance of the first surface along each pixel's ray; finds no triangles and no weights.
 
-    scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
-    whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
-    shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
-    frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
-    seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of the true
-    surface with "raytrace", or by an "environment" map; for the settings, and for many frames, see `Reflection`.
-    explain: print to standard error which stages run, which are left out and why (see `mpcam.explain`). Raises
-    InputError.
+    settings: those of method "invert", see `prepare`. Raises InputError.
     """
-    whole = Scene.of(scene)
-    if whole.mirror is not None:
-        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings)
-    if explain:
-        from mpcam.rendering.explain import explain as explained
-
-        found = explained(camera, whole, method, shading=shading, shadows=shadows, **settings)
-        sys.stderr.write(f"{found}\n")
-    maps: Any = ()
-    if shadows:
-        from mpcam.effects.shadows import shadow_maps
-
-        maps = shadow_maps(whole, shadow_size, shading)
-    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading, maps)
+    return prepare(camera, mesh, output="depth", **settings).frame()
 
 
-def _mirrored(
-    camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
-) -> np.ndarray:
-    """`render` of a scene with a mirror."""
-    from mpcam.effects.reflection import SETTINGS, Reflection
+def coverage_map(camera: Camera, mesh: Mesh | Scene, **settings: Any) -> CoverageMap:
+    """Which pixels see any surface; finds no depths.
 
-    names = {"invert": "camera_triangles"} | {name: name for name in ("vertex", "environment", "raytrace")}
-    if method not in names:
-        raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
-    allowed = [name for name in SETTINGS[names[method]] if name != "cams"]
-    for name in settings:
-        if name not in allowed:
-            raise InputError(
-                f"method={method!r} has no setting {name!r} where there is a mirror: allowed are "
-                f"{', '.join(allowed) or 'none'}"
-            )
-    maps: Any = ()
-    if shadow_size:
-        from mpcam.effects.shadows import shadow_maps
-
-        maps = shadow_maps(scene, shadow_size, shading)
-    picture = Reflection(scene, camera, method=names[method], shading=shading, shadows=maps, **settings)
-    if explain:
-        sys.stderr.write(f"{picture.explanation}\n")
-    return picture.image()
+    settings: those of method "invert", see `prepare`. Raises InputError.
+    """
+    return prepare(camera, mesh, output="coverage", **settings).frame()

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.types import PosedRays
 from mpcam.rendering.block_layout import BlockLayout, image_layout
-from mpcam.rendering.device import DeviceMesh, Lens, lens, opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import View
+from mpcam.rendering.device import DeviceMesh
+from mpcam.rendering.device_camera import DeviceCamera, around, device_camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,27 +35,10 @@ class DeviceRays:
         """Int, the slot of each pixel row by row, -1 where there is none."""
         return self.layout.on_device["slots"]
 
-    def pose(self, camera: Camera) -> np.ndarray:
-        """4x4, the frame of the rays, in scene units, from the world."""
-        return from_anchor(camera, self.anchor)
-
     @exclusive
-    def view(self, camera: Camera) -> View:
-        """The rays in scene units."""
-        return View(self.pose(camera), self.rows())
-
-
-def from_anchor(camera: Camera, anchor: np.ndarray) -> np.ndarray:
-    """4x4, the camera's axes around an anchor of its frame, from the world."""
-    pose = np.array(camera.camera_from_world, np.float64)
-    pose[:3, 3] -= anchor
-    return pose
-
-
-def lens_view(camera: Camera) -> View:
-    """The rays of a camera's pixels, in scene units."""
-    found = lens(camera)
-    return View(from_anchor(camera, found.anchor), found.ray)
+    def posed(self, camera: Camera) -> PosedRays:
+        """The rays in scene units; camera: the one whose rays they are, at any pose."""
+        return PosedRays(around(camera, self.anchor), self.rows())
 
 
 def device_rays(camera: Camera, device: DeviceMesh, planes: bool = False) -> DeviceRays:
@@ -63,10 +47,10 @@ def device_rays(camera: Camera, device: DeviceMesh, planes: bool = False) -> Dev
         from mpcam.rendering.camera_triangle_rays import camera_triangle_rays
 
         return camera_triangle_rays(camera, device.scale, planes)
-    return lens_rays(lens(camera), device.scale)
+    return image_rays(device_camera(camera), device.scale)
 
 
-def lens_rays(camera: Lens, scale: float) -> DeviceRays:
+def image_rays(camera: DeviceCamera, scale: float) -> DeviceRays:
     """The rays of a camera's pixels as it gives them; made once for all poses of the camera."""
     kind = "central" if camera.has_center else "general"
     key = kind, 1.0 if kind == "central" else scale

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras.pose import frame_origin
+from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.scene import DirectionalLight, PointLight, Scene
-from mpcam.rendering.device import opaque_numbers, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.hits import Hits
+from mpcam.scene.scene import DirectionalLight, PointLight, Scene
 
 SHADINGS = ("color", "normal", "texture", "light")
 

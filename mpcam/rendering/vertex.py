@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Images, Projects, need
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
-from mpcam.rendering.device import to_camera, types
-from mpcam.rendering.exclusive import exclusive
+from mpcam.rendering.device import to_camera
 
 MOST_LEVELS = 7
 MOST_TRIANGLES = 1 << 26
@@ -28,20 +30,30 @@ class VertexProjected(Buffered):
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, level: int = 0):
-        if isinstance(level, bool) or not isinstance(level, (int, np.integer)) or not 0 <= level <= MOST_LEVELS:
-            raise InputError(
-                f"level={level!r}: a whole number from 0 to {MOST_LEVELS} is needed (edges split 2**level times)"
-            )
+        level = whole_number("level", level, 0, MOST_LEVELS, hint="edges split 2**level times")
         total = mesh.triangle_count * 4**level
         if total > MOST_TRIANGLES:
             raise InputError(
                 f"level={level} makes {total} triangles of {mesh.triangle_count}: at most {MOST_TRIANGLES}"
             )
-        super().__init__(camera, mesh, "projected" if camera.ray_geometry == "central" else "planar")
-        self.level = int(level)
+        super().__init__(camera, mesh)
+        self.level = level
         self.parts = Parts(2**self.level)
         self.corners = self.faces  # of the whole triangles
         self.faces = self.parts.faces(self.corners, mesh.triangle_count)
+
+    def test_for(self, camera: Camera) -> str:
+        instead = "use method='invert' or 'raytrace'"
+        if camera.ray_geometry != "general":
+            need(camera, Images, "method='vertex'", instead)
+            return "projected" if camera.ray_geometry == "central" else "planar"
+        need(camera, Projects, "method='vertex'", instead)
+        if camera.images_per_point != 1:
+            raise InputError(
+                f"method='vertex' needs one image for each point; a {type(camera).__name__} has up to "
+                f"{camera.images_per_point}: {instead}"
+            )
+        return "projected"
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
@@ -52,7 +64,7 @@ class VertexProjected(Buffered):
         number = threads(types(), 0, points)
         target = dr.empty(types().Float, 4 * points)
         place = _frozen_place(type(self.camera), self.camera.domain.image_radius is None, self.level)
-        data = (self.lens.on_device, self.pose, self.unit, vertices, self.corners)
+        data = (self.device_camera.on_device, self.pose, self.unit, vertices, self.corners)
         return [place(number, target, self.parts.grid, *data)]
 
     def parent(self, triangle: Any) -> Any:
@@ -73,7 +85,7 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
 
     from mpcam_kernels.frozen import frozen
 
-    central = model.ray_geometry == "central"
+    geometry = model.ray_geometry
 
     @frozen
     def place(
@@ -84,12 +96,15 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
         else:
             points = (2**level + 1) * (2**level + 2) // 2
             point = tessellated(grid, lambda number: to_camera(pose, vertices, number), faces, number, points)
-        if not central:
+        if geometry == "parallel":
             point = point * unit
             pixel, _ = camera.local_image(point)
             row = types().Array4f(pixel.x, pixel.y, point.z, 0)
-        else:
+        elif geometry == "central":
             row = corner(camera, point, dr.norm(point) * unit, unbounded)
+        else:
+            ((u, v), depth, valid) = camera.local_project(point * unit)[0]
+            row = types().Array4f(u, v, dr.select(valid, depth, dr.nan), 0)
         dr.scatter(target, row, number)
         return target
 

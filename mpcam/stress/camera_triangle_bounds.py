@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.device import types
 from mpcam.rendering.general import BOUNDS, GeneralRasterizer
 from mpcam.stress.report import Case
 

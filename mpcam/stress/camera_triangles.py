@@ -67,7 +67,7 @@ def _images_double(v: np.ndarray, d: np.ndarray, q: np.ndarray) -> np.ndarray:
 def _images_single(v: np.ndarray, d: np.ndarray, q: np.ndarray) -> np.ndarray:
     import drjit as dr
 
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
 
     corners, rays = [[types().Array3f(*x[:, i].T.astype(np.float32)) for i in range(3)] for x in (v, d)]
     images = [list(image) for image in project(corners, rays, types().Array3f(*q.T.astype(np.float32)))]

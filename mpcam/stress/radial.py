@@ -70,7 +70,7 @@ def point_sets(camera: Radial, count: int, seed: int = 1) -> dict[str, np.ndarra
 
 def projection_cases(name: str, camera: Radial, count: int) -> list[Case]:
     """`Camera.local_project` in both precisions against mpmath at 50 digits."""
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
 
     cases = []
     for kind, points in point_sets(camera, count).items():
@@ -162,7 +162,7 @@ def _missed(camera: Radial, corners: np.ndarray) -> dict[str, int]:
     """How many triangles have a sampled point, along the edges or inside, that a bound leaves out."""
     import drjit as dr
 
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
 
     t = types()
     exact = [t.Array3f64(*corners[:, i].T.astype(np.float64)) for i in range(3)]

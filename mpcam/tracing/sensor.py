@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.pose import frame_origin
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
+from mpcam.math.pose import frame_origin
 
 _registered: set[str] = set()
 _kept: dict[str, Camera] = {}
@@ -31,8 +32,7 @@ def sensor(
     """
     if not isinstance(camera, Camera):
         raise InputError(f"sensor(camera={type(camera).__name__}): give one of mpcam's cameras")
-    if isinstance(samples, bool) or not isinstance(samples, int) or samples < 1:
-        raise InputError(f"sensor(samples={samples!r}): a whole number >= 1 is needed")
+    samples = whole_number("samples", samples, 1, of="sensor")
     settings = {
         "type": "hdrfilm",
         "width": camera.width,
@@ -94,7 +94,7 @@ def _sensor_class(mi: Any) -> type:
         def __init__(self, properties: Any):
             super().__init__(properties)
             if "camera" not in properties:
-                raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.truth.sensor(camera)")
+                raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.tracing.sensor(camera)")
             self.camera = _read(str(properties["camera"]))
             self.centred = bool(properties.get("centred", False))
             size = self.film().size()

@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
+from mpcam.backend import types
 from mpcam.errors import SetupError
 
 
@@ -15,7 +16,6 @@ def mitsuba() -> Iterator[Any]:
     """
     import mitsuba as mi
 
-    from mpcam.rendering.device import types
     from mpcam_kernels.backend import backend_name
 
     types()  # checks LLVM before anything is compiled

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpcam.errors import InputError
-from mpcam.math import Array, library
+from mpcam.math.arrays import Array, library
 
 
 def look_at(eye: Array, target: Array, up: Array = (0.0, 0.0, 1.0)) -> np.ndarray:

@@ -4,27 +4,29 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.types import Ray
+from mpcam.cameras.types import PosedRays, Ray
+from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh, lens, opaque_zero, types
-from mpcam.rendering.exclusive import exclusive
-from mpcam.rendering.hits import Hits, Stats, View
-from mpcam.rendering.ray_blocks import device_rays, from_anchor
-from mpcam.truth.meshes import mitsuba_mesh, move, position_key
-from mpcam.truth.variant import mitsuba
+from mpcam.rendering.device import DeviceMesh, device_mesh
+from mpcam.rendering.device_camera import posed_rays
+from mpcam.rendering.explanation import Step, timed_steps
+from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.ray_blocks import device_rays
+from mpcam.tracing.meshes import mitsuba_mesh, move, position_key
+from mpcam.tracing.variant import mitsuba
 
 
 def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
     """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
     if isinstance(camera, CameraTriangles):
-        rays = device_rays(camera, device)
-        (origin, direction, valid), frame = rays.rows(), rays.pose(camera)
+        posed = device_rays(camera, device).posed(camera)
     else:
-        (origin, direction, valid), frame = lens(camera).ray, from_anchor(camera, lens(camera).anchor)
-    pose, scale = device.pose(frame), 1.0 / device.scale
+        posed = posed_rays(camera)
+    (origin, direction, valid), pose, scale = posed.ray, device.pose(posed.pose), 1.0 / device.scale
     moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
     columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
     world = [sum(columns[i][j] * moved[j] for j in range(3)) for i in range(3)]
@@ -43,16 +45,27 @@ class RayTraced:
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, rays: Ray | None = None):
+        self.mesh, self.own_rays = mesh, rays is None
+        self.device: DeviceMesh = device_mesh(mesh)
+        self._look(camera, rays)
+        self._build(mesh.vertices)
+
+    @exclusive
+    def aim(self, camera: Camera) -> None:
+        """Another camera, or another pose of it: the tree stays as it is. Raises InputError where rays were given."""
+        if not self.own_rays:
+            raise InputError("these frames are of rays that were given, not of a camera's: prepare anew")
+        self._look(camera, None)
+
+    def _look(self, camera: Camera, rays: Ray | None) -> None:
         import drjit as dr
 
-        self.camera, self.mesh, self.own_rays = camera, mesh, rays is None
-        self.device: DeviceMesh = device_mesh(mesh)
+        self.camera = camera
         with mitsuba() as mi:
             world, along, valid = rays_in_rows(camera, self.device) if rays is None else self.device.rays(rays)
             self._ray = mi.Ray3f(mi.Point3f(*map(mi.Float, world)), mi.Vector3f(*map(mi.Float, along)))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
-        self._build(mesh.vertices)
 
     def _build(self, vertices: np.ndarray) -> None:
         """A scene of the faces whose corners are finite."""
@@ -116,7 +129,7 @@ class RayTraced:
             None if self.own_rays else self._view,
         )
 
-    def _view(self) -> View:
+    def _view(self) -> PosedRays:
         t = types()
         origin, direction = (t.Array3f(*(t.Float(x) for x in part)) for part in (self._ray.o, self._ray.d))
         return self.device.view(origin, direction, t.Bool(self._valid))
@@ -134,3 +147,7 @@ class RayTraced:
         self.frame()
         clock.done("trace")
         return clock.seconds
+
+    def explain(self) -> tuple[Step, ...]:
+        """The stages of a frame; takes one frame to find out."""
+        return tuple(timed_steps(self.stages(), self.method))

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.checks import shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
-from mpcam.geometry.mirror import Mirror
+from mpcam.geometry.mesh import Mesh
+from mpcam.scene.mirror import Mirror
 
 Vector = tuple[float, float, float]
 

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.checks import is_number, shown
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh, shown
+from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
 
@@ -32,8 +33,7 @@ class Mirror:
                 f"mirror surface is a {type(self.surface).__name__}: give a Mesh or a Surface, e.g. Surface.sphere()"
             )
         if self.index is not None:
-            number = isinstance(self.index, (int, float, np.number)) and not isinstance(self.index, bool)
-            if not number or not (np.isfinite(self.index) and self.index > 0):
+            if not is_number(self.index) or self.index <= 0:
                 raise InputError(
                     f"mirror index={shown(self.index)}: give a finite number above 0, or None for a mirror"
                 )

@@ -1,0 +1,38 @@
+"""Values from callers: how they are shown in a message, and the checks that many functions share."""
+
+from typing import Any
+
+import numpy as np
+
+from mpcam.errors import InputError
+
+
+def shown(value: Any) -> str:
+    """A value as it appears in an error message: one line, not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is one finite real number; True and False are none."""
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def whole_number(
+    name: str, value: Any, low: int, high: int | None = None, *, of: str = "", unit: str = "", hint: str = ""
+) -> int:
+    """The value as an int; raises InputError unless it is a whole number from low to high (None: no limit).
+
+    name: of the argument. of: the function that it was given to. unit: what is counted. hint: what it does, in a few
+    words.
+    """
+    if not isinstance(value, bool) and isinstance(value, (int, np.integer)):
+        if low <= value and (high is None or value <= high):
+            return int(value)
+    given = f"{name}={shown(value)}"
+    kind = f"a whole number of {unit}" if unit else "a whole number"
+    if high is None:
+        allowed = f">= {low}"
+    else:
+        allowed = f"from {low:,} to {high:,}" if high >= 100_000 else f"from {low} to {high}"
+    raise InputError(f"{f'{of}({given})' if of else given}: {kind} {allowed} is needed{f' ({hint})' if hint else ''}")

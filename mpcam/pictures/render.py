@@ -1,0 +1,72 @@
+"""`render`: an image of a scene, with or without a mirror, by any method."""
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.effects.reflection import SETTINGS, Reflection
+from mpcam.effects.shadows import shadow_maps
+from mpcam.errors import InputError
+from mpcam.pictures.explain import explain as explained
+from mpcam.rendering.methods import rasterize
+from mpcam.rendering.shade import shade
+from mpcam.scene.scene import Scene
+
+
+def render(
+    camera: Camera,
+    scene: Any,
+    method: str = "invert",
+    *,
+    shading: str = "light",
+    shadows: bool = False,
+    shadow_size: int = 1024,
+    explain: bool = False,
+    **settings: Any,
+) -> np.ndarray:
+    """An image: (H, W, 3) float32, linear RGB.
+
+    scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
+    whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
+    shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
+    frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
+    seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of the true
+    surface with "raytrace", or by an "environment" map; for the settings, and for many frames, see `Reflection`.
+    explain: print to standard error which stages run, which are left out and why (see `mpcam.explain`). Raises
+    InputError.
+    """
+    whole = Scene.of(scene)
+    if whole.mirror is not None:
+        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings)
+    if explain:
+        found = explained(camera, whole, method, shading=shading, shadows=shadows, **settings)
+        sys.stderr.write(f"{found}\n")
+    maps: Any = ()
+    if shadows:
+        maps = shadow_maps(whole, shadow_size, shading)
+    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading, maps)
+
+
+def _mirrored(
+    camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
+) -> np.ndarray:
+    """`render` of a scene with a mirror."""
+    names = {"invert": "camera_triangles"} | {name: name for name in ("vertex", "environment", "raytrace")}
+    if method not in names:
+        raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
+    allowed = [name for name in SETTINGS[names[method]] if name != "cams"]
+    for name in settings:
+        if name not in allowed:
+            raise InputError(
+                f"method={method!r} has no setting {name!r} where there is a mirror: allowed are "
+                f"{', '.join(allowed) or 'none'}"
+            )
+    maps: Any = ()
+    if shadow_size:
+        maps = shadow_maps(scene, shadow_size, shading)
+    picture = Reflection(scene, camera, method=names[method], shading=shading, shadows=maps, **settings)
+    if explain:
+        sys.stderr.write(f"{picture.explanation}\n")
+    return picture.image()

@@ -1,0 +1,163 @@
+"""Cameras on the device: their numbers for kernels and their pixels' rays, for every pose; the last used are kept."""
+
+import copy
+import dataclasses
+import functools
+from typing import Any
+
+import numpy as np
+
+from mpcam.backend import opaque_numbers, types
+from mpcam.cameras.base import Camera
+from mpcam.cameras.profiles import Profile
+from mpcam.cameras.types import PosedRays
+from mpcam.errors import InputError
+from mpcam.math import library
+from mpcam.rendering.pixel_rays import pixel_rays
+
+
+def _key(camera: Camera) -> tuple[Any, ...]:
+    """What decides a camera's rays in its own frame: everything but the pose."""
+    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
+    values = ((name, getattr(camera, name)) for name in names if name != "camera_from_world")
+    return (type(camera), *(_plain(v) for _, v in values))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of any library, tables and tuples of them in a hashable form, the same for the same ones."""
+    if isinstance(value, tuple):
+        return tuple(_plain(v) for v in value)
+    if value is None or isinstance(value, (str, int, Profile)):
+        return value
+    return _Table(value) if np.ndim(value) > 0 else float(value)
+
+
+class _Table:
+    """A large array, told apart by which object it is, small ones by what they hold: cameras are not changed."""
+
+    def __init__(self, value: Any):
+        self.value = value
+        table = np.asarray(value)
+        self._key = id(value) if table.nbytes > 4096 else (table.shape, table.dtype.str, table.tobytes())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Table) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+def _numbers(camera: Camera) -> dict[str, Any]:
+    """The fields that are data: all but the pose, what belongs to the program, words and what is left out."""
+    names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
+    values = ((name, getattr(camera, name)) for name in names)
+    fixed = (*camera.static_fields, "camera_from_world")
+    return {n: value for n, value in values if n not in fixed and not isinstance(value, (str, type(None)))}
+
+
+def unposed(camera: Camera) -> Camera:
+    """The camera at the identity pose with its numbers on the device, for use inside of kernels."""
+    result, values = copy.copy(camera), _numbers(camera)
+    object.__setattr__(result, "camera_from_world", None)
+    numbers = [float(v) for value in values.values() for v in (value if isinstance(value, tuple) else (value,))]
+    on_device = iter(opaque_numbers(numbers))
+    for name, value in values.items():
+        several = isinstance(value, tuple)
+        object.__setattr__(result, name, tuple(next(on_device) for _ in value) if several else next(on_device))
+    return result
+
+
+def _check_profile(profile: Any) -> None:
+    """See that a user's profile runs on Dr.Jit arrays: inside a kernel's recording it is too late to say so."""
+    if not isinstance(profile, Profile):
+        return
+    theta, problem = types().Float([0.1, 0.2]), ""
+    for name in ("radius", "slope", "angle"):
+        try:
+            result = getattr(profile, name)(theta)
+        except (TypeError, ValueError, AttributeError, RuntimeError) as error:
+            problem = f"{name} fails: {error}"
+        else:
+            problem = problem or ("" if library(result) == "drjit" else f"{name} gives a {type(result).__name__}")
+        if problem:
+            text = " ".join(problem.split())
+            raise InputError(
+                f"profile {profile.name!r} does not run on Dr.Jit arrays ({text}): use mpcam.math functions"
+            )
+
+
+class DeviceCamera:
+    """Rays and kernels' view of a camera, which hold for every pose of it.
+
+    ray: of each pixel, row by row, on the device, in the camera's frame, from `anchor` (3,), a point of that frame.
+    kept: what others make of the rays.
+    """
+
+    def __init__(self, camera: Camera):
+        _check_profile(getattr(camera, "profile", None))
+        self.size: tuple[int, int] = (camera.width, camera.height)
+        self.kept: dict[Any, Any] = {}
+        plain = all(np.ndim(value) == 0 for value in _numbers(camera).values() if not isinstance(value, tuple))
+        self.on_device = unposed(camera) if plain else camera
+        self.central = camera.ray_geometry == "central"
+        self.ray, self.anchor = pixel_rays(self.on_device)
+
+    @functools.cached_property
+    def has_center(self) -> bool:
+        """Whether all rays leave from the anchor."""
+        import drjit as dr
+
+        away: Any = dr.any(self.ray.valid & (dr.squared_norm(self.ray.origin) > 0))
+        return self.central or not away[0]
+
+    @functools.cached_property
+    def directions(self) -> Any:
+        """Samples of a central camera."""
+        from mpcam_kernels import samples
+
+        return samples.central_samples(types(), self.ray.direction, self.ray.valid, *self.size)
+
+    @functools.cached_property
+    def centres(self) -> Any:
+        """Samples of the image plane, for straight-edged triangles."""
+        from mpcam_kernels import samples
+
+        return samples.planar_samples(types(), self.ray.valid, *self.size)
+
+
+@functools.lru_cache(maxsize=16)
+def _device_camera(key: tuple[Any, ...], backend: str, holder: "_Held") -> DeviceCamera:
+    return DeviceCamera(holder.camera)
+
+
+class _Held:
+    """Carries a camera past the cache's key: all holders are equal."""
+
+    def __init__(self, camera: Camera):
+        self.camera = camera
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def device_camera(camera: Camera) -> DeviceCamera:
+    """Rays of a camera's pixels on the device; the sixteen used last are kept."""
+    from mpcam_kernels.backend import backend_name
+
+    return _device_camera(_key(camera), backend_name(), _Held(camera))
+
+
+def posed_rays(camera: Camera) -> PosedRays:
+    """The rays of a camera's pixels, in scene units."""
+    known = device_camera(camera)
+    return PosedRays(around(camera, known.anchor), known.ray)
+
+
+def around(camera: Camera, anchor: np.ndarray) -> np.ndarray:
+    """4x4, the camera's axes around an anchor of its frame, from the world."""
+    pose = np.array(camera.camera_from_world, np.float64)
+    pose[:3, 3] -= anchor
+    return pose

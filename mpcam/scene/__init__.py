@@ -1,0 +1,1 @@
+"""What is rendered: scenes, lights and mirrors, and the built-in scenes."""
