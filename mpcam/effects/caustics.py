@@ -9,25 +9,25 @@ and spread there by a normalized kernel: irradiance times area, summed over the 
 
 import dataclasses
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.chaining import chained
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.effects import caustic_kernels as kernels
-from mpcam.effects.caustic_photons import Photons, photons, pixel_solid_angles, solid_angle
+from mpcam.effects.caustic_map import Energy, PhotonMap, concentration
+from mpcam.effects.caustic_photons import Photons, photons, pixel_solid_angles
+from mpcam.effects.caustic_settings import Settings
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
@@ -36,25 +36,6 @@ from mpcam.scene.scene import PointLight, Scene
 
 CHUNK = 1 << 22
 """Points that flux is dropped at, at a time."""
-
-
-class Energy(NamedTuple):
-    """Flux (3,) RGB: on the reflector, on the receivers after it, and in the eye's view of them."""
-
-    reflector: np.ndarray
-    receivers: np.ndarray
-    view: np.ndarray
-
-
-class PhotonMap(NamedTuple):
-    """The photon-location map: arrays (P, P) by pixel of the light's view.
-
-    position (P, P, 3): world. receiver: number of the scene's mesh, -1 for none. flux: for a light of intensity 1.
-    """
-
-    position: np.ndarray
-    receiver: np.ndarray
-    flux: np.ndarray
 
 
 class Caustics:
@@ -70,9 +51,7 @@ class Caustics:
     chained: Chained | None
 
     @exclusive
-    def __init__(
-        self, scene: Scene, reflector: Mesh | Surface, light: PointLight, camera: Camera, settings: "Settings"
-    ):
+    def __init__(self, scene: Scene, reflector: Mesh | Surface, light: PointLight, camera: Camera, settings: Settings):
         self.scene, self.light, self.settings = scene, light, settings
         self._given, self._reflector = reflector, reflector_of(reflector)
         self.cams = decompose(
@@ -105,7 +84,7 @@ class Caustics:
             self._atlas.aim(last)
         self._shade: Any = prepare(self.photons.camera, self.scene.mesh, output="depth")
         self._shade.update(self._vertices)
-        self._rays = _uploaded(self.photons, self._atlas.device, self.scene.mesh.triangle_count)
+        self._rays = self.photons.on_device(self._atlas.device, self.scene.mesh.triangle_count)
         self._forget()
 
     @functools.cached_property
@@ -273,21 +252,7 @@ class Caustics:
         the losses in `photons.share`; 0 where the three do not lie on one receiver. First the triangles at the upper
         left of four photons, then those at the lower right.
         """
-        found, size = self.photon_map, self.photons.camera.width
-        v, u = np.indices((size, size)) + 0.5
-        before = np.asarray(self.photons.camera.ray(np.stack([u, v], axis=-1)).direction)
-        after = found.position - np.asarray(self.light.position)
-        after = after / np.maximum(np.linalg.norm(after, axis=-1, keepdims=True), 1e-300)
-        result = []
-        for corners in _CORNERS:
-            cut = [(slice(y, size - 1 + y), slice(x, size - 1 + x)) for x, y in corners]
-            same = found.receiver[cut[0]] >= 0
-            for other in cut[1:]:
-                same &= found.receiver[other] == found.receiver[cut[0]]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = solid_angle(*(before[c] for c in cut)) / solid_angle(*(after[c] for c in cut))
-            result.append(np.where(same & np.isfinite(ratio), ratio, 0.0))
-        return np.stack(result)
+        return concentration(self.photon_map, self.photons.camera, np.asarray(self.light.position))
 
     @exclusive
     def render(self, shading: str = "light", *, shadows: bool = True, shadow_size: int = 1024) -> np.ndarray:
@@ -315,52 +280,10 @@ class Caustics:
         return found[1]
 
 
-_CORNERS = (((0, 0), (1, 0), (0, 1)), ((1, 1), (0, 1), (1, 0)))
-"""Columns and rows of the photons of the two triangles of four."""
-
-
 def _objects(scene: Scene) -> np.ndarray:
     """(F,) int32 number of the mesh that each face of the scene belongs to."""
     counts = [mesh.triangle_count for mesh in scene.meshes]
     return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
-
-
-def _uploaded(found: Photons, device: DeviceMesh, count: int) -> dict[str, Any]:
-    """The photons in the frame of the receivers' device mesh, and how many faces that has."""
-    import drjit as dr
-
-    t, zero = types(), opaque_zero()
-    start = (found.origin - device.anchor) / device.scale
-
-    def columns(vectors: np.ndarray) -> Any:
-        return t.Array3f(np.ascontiguousarray(vectors.reshape(-1, 3).T, np.float32)) + zero
-
-    rays = {
-        "texels": [t.Int(found.texels[..., k].astype(np.int32).ravel()) + t.Int(zero) for k in range(4)],
-        "flux": t.Float(found.flux.astype(np.float32).ravel()) + zero,
-        "reach": t.Float(found.reach.astype(np.float32).ravel()) + zero,
-        "origin": columns(start),
-        "along": columns(found.direction),
-        "unit": opaque_numbers([device.scale])[0],
-        "count": t.Int(opaque_numbers([count])[0]),
-    }
-    dr.eval(rays)
-    return rays
-
-
-@dataclasses.dataclass(frozen=True)
-class Settings:
-    """What `caustics` was asked for."""
-
-    triangles: int = 400
-    resolution: Any = 64
-    photons: int = 512
-    radius: float = 2.0
-    index: float | None = None
-    back: Mesh | Surface | None = None
-    reflectance: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    fresnel: bool = True
-    show: bool = True
 
 
 def caustics(
@@ -397,31 +320,17 @@ def caustics(
     whole = Scene.of(scene)
     if not isinstance(light, PointLight):
         raise InputError(f"caustics: light is a {type(light).__name__}: give a PointLight")
-    photons = whole_number("photons", photons, 2, 4096, of="caustics")
-    if not is_number(radius) or not 0 <= radius <= 8:
-        raise InputError(f"caustics(radius={shown(radius)}): give pixels from 0 to 8")
-    if back is not None and index is None:
-        raise InputError(
-            "caustics: back= is where light leaves a lens: give index= with it, or leave it out for a mirror"
-        )
-    try:
-        colour = np.broadcast_to(np.asarray(reflectance, np.float64), 3)
-    except (TypeError, ValueError):
-        colour = np.full(3, np.nan)
-    if not ((colour >= 0) & (colour <= 1)).all():
-        raise InputError(f"caustics(reflectance={shown(reflectance)}): give one number or three from 0 to 1")
-    if whole.mesh.triangle_count == 0:
-        raise InputError("caustics: the scene has no triangles that light could fall on: give receivers")
-    red, green, blue = (float(part) for part in colour)
     settings = Settings(
         triangles=triangles,
         resolution=resolution,
         photons=photons,
-        radius=float(radius),
+        radius=radius,
         index=index,
         back=back,
-        reflectance=(red, green, blue),
+        reflectance=reflectance,
         fresnel=bool(fresnel),
         show=index is None if show is None else bool(show),
     )
+    if whole.mesh.triangle_count == 0:
+        raise InputError("caustics: the scene has no triangles that light could fall on: give receivers")
     return Caustics(whole, reflector, light, camera, settings)

@@ -3,77 +3,16 @@
 `mpcam experiment NAME` runs one; from Python, `run(NAME)`.
 """
 
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpcam.errors import InputError
+from mpcam.experiments.catalogue import EXPERIMENTS
 
 if TYPE_CHECKING:
     from mpcam.comparison.progress import Progress
     from mpcam.experiments.results import Report
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """An experiment's name, the module of this package that has its `run`, and what it measures, in one line."""
-
-    name: str
-    module: str
-    summary: str
-
-
-EXPERIMENTS = {
-    experiment.name: experiment
-    for experiment in (
-        Experiment(
-            "gascuel2008-table2",
-            "gascuel2008_table2",
-            "Gascuel et al. 2008, Table 2: cube and hemicube against one or two non-linear projections",
-        ),
-        Experiment(
-            "gascuel2008-table3",
-            "gascuel2008_table3",
-            "Gascuel et al. 2008, Table 3: overdraw and the cost of each step, by projection and bound",
-        ),
-        Experiment(
-            "gascuel2008-fig9",
-            "gascuel2008_fig9",
-            "Gascuel et al. 2008, Fig. 9: the pixels that each bound tests, as pictures",
-        ),
-        Experiment(
-            "gascuel2008-growth",
-            "gascuel2008_growth",
-            "Time and peak memory against the number of triangles and of pixels, next to ray tracing",
-        ),
-        Experiment(
-            "hou2006-table1",
-            "hou2006_table1",
-            "Hou et al. 2006, Table 1: overdraw of camera triangles by bound; frames against rebuilding and tracing",
-        ),
-        Experiment(
-            "hou2006-fig6",
-            "hou2006_fig6",
-            "Hou et al. 2006, Figs. 1 and 6: quality against tessellation, environment maps and ray tracing beside",
-        ),
-        Experiment(
-            "hou2006-fig7",
-            "hou2006_fig7",
-            "Hou et al. 2006, Fig. 7: many moving objects around a teapot, with and without each acceleration",
-        ),
-        Experiment(
-            "leaving-out",
-            "leaving_out",
-            "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",
-        ),
-        Experiment(
-            "moving-scene",
-            "moving_scene",
-            "Rasterizing against rebuilding a tree and tracing, for moving and still scenes",
-        ),
-    )
-}
 
 
 def run(
