@@ -11,7 +11,7 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.math import normalize
 from mpcam.rendering.block_layout import BlockLayout, atlas_layout
-from mpcam.rendering.ray_blocks import DeviceRays, bounded
+from mpcam.rendering.ray_blocks import DeviceRays, bounded, rows_for
 
 
 def camera_triangle_rays(camera: CameraTriangles, scale: float, planes: bool = False) -> DeviceRays:
@@ -30,7 +30,7 @@ def camera_triangle_rays(camera: CameraTriangles, scale: float, planes: bool = F
         if camera.index is not None:
             bent["index"] = opaque_numbers([float(camera.index)])[0]
     used = {name: fixed[name] for name in ("face", "x", "y")} | {"side": _sides(camera.atlas)}
-    rays = _frozen_rays(camera.kind)(fixed["threads"][0], used, rows, bent, _room(layout))
+    rays = _frozen_rays(camera.kind)(fixed["threads"][0], used, rows, bent, rows_for("general", "Rays", layout, 0))
     blocks = bounded("general", rays, layout)
     if planes:
         blocks = replace(blocks, planes=_planes(camera, anchor, scale, layout, blocks.cones))
@@ -60,15 +60,6 @@ def _in_rows(blocks: Any, slots: Any, scale: float) -> Ray:
     ray = Ray(origin * opaque_numbers([scale])[0], dr.select(valid, direction, t.Array3f(0, 0, 1)), valid)
     dr.eval(*ray)
     return ray
-
-
-def _room(layout: BlockLayout) -> Any:
-    import drjit as dr
-
-    from mpcam_kernels.general_rays import Rays
-    from mpcam_kernels.rows import room
-
-    return room(types(), Rays.ROWS, dr.width(layout.on_device["threads"][0]))
 
 
 @functools.lru_cache(maxsize=16)

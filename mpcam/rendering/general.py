@@ -16,10 +16,11 @@ from mpcam.geometry.order import nearby
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh
 from mpcam.rendering.device_camera import around
+from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
-from mpcam.rendering.ray_blocks import DeviceRays, device_rays
+from mpcam.rendering.ray_blocks import DeviceRays
 
 BOUNDS = ("tight", "triangle", "nine_point")
 CULLS = ("none", "back", "front")

@@ -13,9 +13,9 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import DeviceMesh, device_mesh
 from mpcam.rendering.device_camera import posed_rays
+from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
-from mpcam.rendering.ray_blocks import device_rays
 from mpcam.tracing.meshes import mitsuba_mesh, move, position_key
 from mpcam.tracing.variant import mitsuba
 
