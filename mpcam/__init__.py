@@ -8,19 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mpcam.cameras import Box as Box
-    from mpcam.cameras import Camera as Camera
-    from mpcam.cameras import CameraTriangles as CameraTriangles
     from mpcam.cameras import Domain as Domain
-    from mpcam.cameras import DoubleSphere as DoubleSphere
-    from mpcam.cameras import KannalaBrandt as KannalaBrandt
-    from mpcam.cameras import Orthographic as Orthographic
-    from mpcam.cameras import Pinhole as Pinhole
     from mpcam.cameras import Profile as Profile
     from mpcam.cameras import Projection as Projection
-    from mpcam.cameras import Radial as Radial
     from mpcam.cameras import Ray as Ray
-    from mpcam.cameras import UnifiedOmni as UnifiedOmni
     from mpcam.cameras import custom_profile as custom_profile
+    from mpcam.cameras.registry import *  # noqa: F403
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
     from mpcam.decomposition.chained import Chained as Chained
@@ -80,10 +73,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "mpcam.cameras": (
-        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection "
-        "Radial Ray UnifiedOmni custom_profile"
-    ),
+    "mpcam.cameras": "Box Camera Domain Profile Projection Ray custom_profile",
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
     "mpcam.decomposition.chained": "Chained",
@@ -134,7 +124,10 @@ _SUBPACKAGES = (
     "truth",
 )
 
-__all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
+
+def _models() -> dict[str, Any]:
+    """The camera models, which the register names."""
+    return import_module("mpcam.cameras.registry").MODELS
 
 
 def __getattr__(name: str) -> Any:
@@ -144,8 +137,12 @@ def __getattr__(name: str) -> Any:
         return value
     if name in _SUBPACKAGES:
         return import_module(f"mpcam.{name}")
+    if name == "__all__":
+        return sorted([*_HOME, *_models()])
+    if name[:1].isupper() and name in _models():
+        return _models()[name]
     raise AttributeError(f"module 'mpcam' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, *_SUBPACKAGES])
+    return sorted({*globals(), *_HOME, *_SUBPACKAGES, *_models()})

@@ -8,6 +8,14 @@ class InputError(ValueError):
     """
 
 
+class KeyProblem(InputError):
+    """An InputError about one key of a table, for readers of files, which know where the key stands."""
+
+    def __init__(self, key: str, problem: str):
+        super().__init__(f"{key}: {problem}")
+        self.key, self.problem = key, problem
+
+
 class SetupError(RuntimeError):
     """The machine lacks something that mpcam needs; the message is one line: what is wrong, how to mend it.
 

@@ -18,6 +18,7 @@ from mpcam.cli import EXIT_FAILURE, EXIT_INPUT, EXIT_INTERRUPT, app
 from mpcam.comparison.columns import COLUMNS
 from mpcam.geometry.builtin import builtin_mesh
 from mpcam.io import scene_tables as tables
+from mpcam.io.camera_tables import CameraTable, camera_table
 from mpcam.rendering import cubemap, invert, methods, vertex
 from mpcam_kernels.backend import NAMES, VARIABLE
 
@@ -240,10 +241,10 @@ def test_every_column_is_described():
 SECTIONS = (
     ("## Top of the file", tables.SceneTable, None),
     ("## `[[mesh]]`", tables.MeshTable, None),
-    ("## `[camera]`", tables.CameraTable, None),
-    ('`model = "radial"`', tables.RadialTable, tables.CameraTable),
-    ('`model = "pinhole"`', tables.PinholeTable, tables.CameraTable),
-    ('`model = "orthographic"`', tables.OrthographicTable, tables.CameraTable),
+    ("## `[camera]`", CameraTable, None),
+    ('`model = "radial"`', camera_table(mpcam.Radial), CameraTable),
+    ('`model = "pinhole"`', camera_table(mpcam.Pinhole), CameraTable),
+    ('`model = "orthographic"`', camera_table(mpcam.Orthographic), CameraTable),
     ('`type = "directional"`', tables.DirectionalTable, None),
     ('`type = "point"`', tables.PointTable, None),
     ("## `[mirror]`", tables.MirrorTable, None),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mpcam.cameras.capabilities import Bounds, HasRays, Projects, need
+from mpcam.cameras.fields import Limits, limits_of
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.checks import whole_number
 from mpcam.errors import InputError
@@ -78,6 +79,15 @@ class Camera:
     def domain(self) -> Domain:
         """Where the camera is defined; unless a model says otherwise, nothing is known of it."""
         return Domain(None, None)
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> "dict[str, Camera]":
+        """Small sensible cameras of this model by name: typical, wide, extreme but legal; for tests and stress.
+
+        width, height: pixels. camera_from_world: 4x4, the pose of all of them. A model that cannot be made from these
+        alone has examples of its own.
+        """
+        return {"default": cls(width, height, camera_from_world=camera_from_world)}  # pyright: ignore[reportCallIssue]
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
@@ -182,19 +192,23 @@ class Camera:
         object.__setattr__(self, "camera_from_world", as_pose(self.camera_from_world))
         register_pytrees()
 
-    def _check_number(self, name: str, low: float = -np.inf, high: float = np.inf) -> None:
-        """Check that a field is a finite number strictly between low and high; other libraries' arrays pass."""
+    def _check_numbers(self) -> None:
+        """Check all fields whose types have limits."""
+        for name, limits in limits_of(type(self)).items():
+            self._check_number(name, **dataclasses.asdict(limits))
+
+    def _check_number(self, name: str, above: float | None = None, below: float | None = None, **ends: Any) -> None:
+        """Check that a field is a finite number within Limits; other libraries' arrays pass."""
         value = getattr(self, name)
         if library(value) != "numpy":
             return
-        allowed = "a finite number" if low == -np.inf else f"a finite number above {low:g}"
-        allowed += "" if high == np.inf else f" and below {high:g}"
+        limits = Limits(above, below, **ends)
         try:
             number = float(value)
         except (TypeError, ValueError):
-            raise InputError(f"{type(self).__name__}({name}={value!r}): {allowed} is needed") from None
-        if not (np.isfinite(number) and low < number < high):
-            raise InputError(f"{type(self).__name__}({name}={value!r}): {allowed} is needed")
+            number = np.nan
+        if not limits.allow(number):
+            raise InputError(f"{type(self).__name__}({name}={value!r}): {limits} is needed")
         object.__setattr__(self, name, number)
 
 

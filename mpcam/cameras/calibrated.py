@@ -84,10 +84,7 @@ class Calibrated:
 
     def _check_lens(self) -> None:
         """Check the fields that all models have, and derive the domain."""
-        for name in ("fx", "fy"):
-            self._check_number(name, 0)  # pyright: ignore[reportAttributeAccessIssue]
-        for name in ("cx", "cy", "max_angle"):
-            self._check_number(name)  # pyright: ignore[reportAttributeAccessIssue]
+        self._check_numbers()  # pyright: ignore[reportAttributeAccessIssue]
         if library(self.max_angle) == "numpy" and not 0 < self.max_angle <= PI:
             raise InputError(
                 f"{type(self).__name__}(max_angle={self.max_angle!r}): radians above 0 and at most pi are needed"

@@ -72,6 +72,35 @@ class CameraTriangles(Camera):
             self._check_plane()
         register_pytrees()
 
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """Two triangles with rays of their own, a mirror, a lens, and rays to both sides; about as large as asked."""
+        pose, side = camera_from_world, min(width, height)
+        corners = np.array([[-1, -1, 2], [1, -1, 2.1], [-1, 1, 1.9], [1.1, 1, 2.2]])
+        faces = [[0, 1, 2], [1, 3, 2]]
+        rng = np.random.default_rng(3)
+        cap = np.array([[x, y, 3 - np.sqrt(3 - x * x - y * y)] for y in (-1, 0, 1) for x in (-1, 0, 1)])
+        grid = [[i + a, i + b, i + c] for i in (0, 1, 3, 4) for a, b, c in ((0, 1, 3), (1, 4, 3))]
+        bent = {"normals": cap - [0, 0, 3], "eye": (0.2, 0.1, -2), "resolution": max(2, side // 2 - 3)}
+        return {
+            "direct": cls(
+                corners,
+                faces,
+                directions=[[0, 0, 1], [0.3, 0, 1], [0, 0.3, 1], [0.2, 0.2, 1]],
+                resolution=max(2, side - 3),
+                camera_from_world=pose,
+            ),
+            "mirror": cls(cap, grid, **bent, camera_from_world=pose),
+            "lens": cls(cap, grid, **bent, index=1.5, camera_from_world=pose),
+            "mixed signs": cls(
+                rng.normal(size=(5, 3)),
+                [[0, 1, 2], [1, 2, 3], [2, 3, 4]],
+                directions=rng.normal(size=(5, 3)),
+                resolution=max(2, side // 2 - 3),
+                camera_from_world=pose,
+            ),
+        }
+
     @property
     def count(self) -> int:
         """Number of camera triangles."""

@@ -1,11 +1,13 @@
 """The double sphere: two unit spheres and a pinhole, with projection and inverse in closed form."""
 
 import dataclasses
-from typing import Any
+import math
+from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import FARTHEST, NEARLY_PI, Calibrated
-from mpcam.cameras.unified_omni import check_alpha, denominator, sphere_border, sphere_direction, widest_radius
+from mpcam.cameras.fields import Limits, Number, Positive, Share
+from mpcam.cameras.unified_omni import denominator, sphere_border, sphere_direction, widest_radius
 from mpcam.math import PI, Array, atan2, cos, maximum, minimum, safe_sqrt, sin, sqrt, where
 
 
@@ -29,14 +31,14 @@ class DoubleSphere(Calibrated, Camera):
 
     width: int
     height: int
-    fx: Any
-    fy: Any
-    cx: Any
-    cy: Any
-    xi: Any
-    alpha: Any
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    xi: Annotated[Any, Limits(above=-1)]
+    alpha: Share
     camera_from_world: Any = None
-    max_angle: Any = PI
+    max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
@@ -45,9 +47,16 @@ class DoubleSphere(Calibrated, Camera):
 
     def __post_init__(self) -> None:
         self._check_frame()
-        self._check_number("xi", -1)
-        check_alpha(self)
         self._check_lens()
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """A common lens, and one with the second centre outside of the first sphere."""
+        frame = (width, height, 0.37 * width, 0.38 * width, 0.52 * width, 0.49 * height)
+        return {
+            "double_sphere": cls(*frame, -0.2, 0.59, camera_from_world),
+            "centre outside": cls(*frame, 1.5, 0.3, camera_from_world, math.radians(115)),
+        }
 
     def _parts(self, theta: Array) -> tuple[Array, Array, Array]:
         """sin theta, d2 and the denominator of r, for a point at distance 1."""

@@ -2,12 +2,14 @@
 
 import dataclasses
 import functools
-from typing import Any
+import math
+from typing import Annotated, Any
 
 import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import Calibrated
+from mpcam.cameras.fields import Number, Positive
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, detach, invert_increasing, library, minimum, polynomial, sign_changes
 
@@ -33,13 +35,13 @@ class KannalaBrandt(Calibrated, Camera):
 
     width: int
     height: int
-    fx: Any
-    fy: Any
-    cx: Any
-    cy: Any
-    k: Any
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    k: Annotated[Any, tuple[float, float, float, float]] = (0.0, 0.0, 0.0, 0.0)
     camera_from_world: Any = None
-    max_angle: Any = PI
+    max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
@@ -50,6 +52,15 @@ class KannalaBrandt(Calibrated, Camera):
         self._check_frame()
         object.__setattr__(self, "k", _four(self.k))
         self._check_lens()
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """A common lens, and one whose polynomial folds within the image."""
+        frame = (width, height, 0.31 * width, 0.3 * width, 0.48 * width, 0.51 * height)
+        return {
+            "kannala_brandt": cls(*frame, (0.05, -0.01, 0.0, 0.0), camera_from_world),
+            "folds": cls(*frame, (0.05, -0.05, 0.0, 0.0), camera_from_world, math.radians(110)),
+        }
 
     def radius_at(self, theta: Array) -> Array:
         """r = f(theta) in focal lengths, theta in radians from the axis."""

@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any, ClassVar
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.fields import Number, Positive
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.math import Array, Vector, isfinite, maximum, minimum, vector, where
 
@@ -19,9 +20,9 @@ class Orthographic(Camera):
 
     width: int
     height: int
-    scale: Any = None
-    cx: Any = None
-    cy: Any = None
+    scale: Positive = None
+    cx: Number = None
+    cy: Number = None
     camera_from_world: Any = None
 
     ray_geometry: ClassVar[RayGeometry] = "parallel"
@@ -32,9 +33,12 @@ class Orthographic(Camera):
         for name, default in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default)
-        self._check_number("scale", 0)
-        self._check_number("cx")
-        self._check_number("cy")
+        self._check_numbers()
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """A little more than [-1, 1] across."""
+        return {"orthographic": cls(width, height, 0.4 * width, camera_from_world=camera_from_world)}
 
     @property
     def domain(self) -> Domain:

@@ -1,12 +1,14 @@
 """The pinhole camera: straight lines stay straight."""
 
 import dataclasses
-from typing import Any, ClassVar, Self
+import math
+from typing import Annotated, Any, ClassVar, Self
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.outline import HIDDEN, NEAR, UNSURE, Outline, VertexView, small_outline
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
-from mpcam.errors import InputError
+from mpcam.errors import InputError, KeyProblem
 from mpcam.math import PI, Array, Vector, epsilon, isfinite, maximum, minimum, norm, normalize, tan, vector, where
 
 _FAR = 1e9  # pixels; stands for infinity in boxes, so that no arithmetic on boxes makes NaN
@@ -24,10 +26,10 @@ class Pinhole(Camera):
 
     width: int
     height: int
-    fx: Any = None
-    fy: Any = None
-    cx: Any = None
-    cy: Any = None
+    fx: Positive = None
+    fy: Positive = None
+    cx: Number = None
+    cy: Number = None
     camera_from_world: Any = None
 
     ray_geometry: ClassVar[RayGeometry] = "central"
@@ -38,10 +40,7 @@ class Pinhole(Camera):
         for name, default in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, self.fx if name == "fy" else default)
-        self._check_number("fx", 0)
-        self._check_number("fy", 0)
-        self._check_number("cx")
-        self._check_number("cy")
+        self._check_numbers()
 
     @classmethod
     def from_fov(cls, width: int, height: int, fov_x: float, camera_from_world: Any = None) -> Self:
@@ -49,6 +48,30 @@ class Pinhole(Camera):
         if not 0 < fov_x < PI:
             raise InputError(f"Pinhole.from_fov(fov_x={fov_x!r}): radians between 0 and pi are needed")
         return cls(width, height, 0.5 * width / tan(0.5 * fov_x), camera_from_world=camera_from_world)
+
+    @classmethod
+    def from_table(
+        cls,
+        width: int,
+        height: int,
+        fov: Annotated[float, Limits(above=0, below=180)] | None = None,
+        focal: tuple[Positive, Positive] | None = None,
+        center: tuple[float, float] | None = None,
+    ) -> Self:
+        """From the keys of a scene file: `fov` is the angle across the width, degrees, 60 if there is no `focal`."""
+        if focal is None:
+            if center is not None:
+                raise KeyProblem("center", "give camera.focal too, or leave center out")
+            return cls.from_fov(width, height, math.radians(60.0 if fov is None else fov))
+        if fov is not None:
+            raise KeyProblem("fov", "give fov or focal, not both")
+        return cls(width, height, *focal, *(center or (0.5 * width, 0.5 * height)))
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """Some 80 degrees across, off centre."""
+        frame = (0.6 * width, 0.55 * width, 0.47 * width, 0.52 * height)
+        return {"pinhole": cls(width, height, *frame, camera_from_world)}
 
     @property
     def domain(self) -> Domain:

@@ -1,18 +1,21 @@
 """Single-centre cameras with radial symmetry, r = f(theta) (Gascuel et al. 2008)."""
 
 import dataclasses
+import math
 from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from mpcam.cameras.arcs import radial_bound, radial_bound_rough
 from mpcam.cameras.base import Camera
 from mpcam.cameras.chords import radial_bound_triangles
+from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
 from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
+from mpcam.cameras.tables import degrees, plain_value
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
-from mpcam.errors import InputError
+from mpcam.errors import InputError, KeyProblem
 from mpcam.math import PI, Array, Vector, epsilon, library, vector
 
 
@@ -34,10 +37,10 @@ class Radial(Camera):
     height: int
     profile: Any
     camera_from_world: Any = None
-    fov: Any = PI
-    radius: Any = None
-    cx: Any = None
-    cy: Any = None
+    fov: Positive = PI
+    radius: Positive = None
+    cx: Number = None
+    cy: Number = None
 
     ray_geometry: ClassVar[RayGeometry] = "central"
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "profile")
@@ -54,10 +57,7 @@ class Radial(Camera):
         for name, default in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default)
-        self._check_number("fov", 0)
-        self._check_number("radius", 0)
-        self._check_number("cx")
-        self._check_number("cy")
+        self._check_numbers()
         limit = 2 * self.profile.limit
         if library(self.fov) == "numpy" and (
             self.fov > limit * (1 + 1e-12) or (self.fov >= limit and not self.profile.limit_included)
@@ -107,6 +107,46 @@ class Radial(Camera):
         """A user's own r = function(theta), on [0, fov / 2]; see `custom_profile` for what is checked."""
         profile = custom_profile(function, 0.5 * fov, slope=slope, angle=angle, name=name)
         return cls(width, height, profile, camera_from_world, fov, **rest)
+
+    @classmethod
+    def from_table(
+        cls,
+        width: int,
+        height: int,
+        projection: Literal["paraboloid", "cosine_sphere", "equisolid", "equidistant"] = "paraboloid",
+        fov: Annotated[float, Limits(above=0, at_most=360)] = 180.0,
+        radius: Positive | None = None,
+        center: tuple[float, float] | None = None,
+    ) -> Self:
+        """From the keys of a scene file: `projection` is the profile's name, `fov` in degrees."""
+        profile = PROFILES[projection]
+        limit = 2 * math.degrees(profile.limit)
+        if fov > limit or (fov == limit and not profile.limit_included):
+            end = "up to" if profile.limit_included else "below"
+            raise KeyProblem("fov", f"the projection {projection} reaches {end} {limit:g} degrees")
+        cx, cy = center or (None, None)
+        return cls(width, height, profile, fov=math.radians(fov), radius=radius, cx=cx, cy=cy)
+
+    def to_table(self) -> dict[str, Any]:
+        """The keys that `from_table` takes, but for width and height."""
+        name = plain_value(self.profile)
+        rest = {"radius": float(self.radius), "center": [float(self.cx), float(self.cy)]}
+        return {"projection": name, "fov": degrees(float(self.fov)), **rest}
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """All profiles at 180 degrees, a narrow view, and three beyond the horizon, one of all directions."""
+        pose = camera_from_world
+        return {
+            "paraboloid": cls.paraboloid(width, height, pose),
+            "cosine_sphere": cls.cosine_sphere(width, height, pose),
+            "equisolid": cls.equisolid(width, height, pose),
+            "equidistant": cls.equidistant(width, height, pose),
+            "narrow": cls.equidistant(width, height, pose, fov=1.2),
+            "paraboloid 270": cls.paraboloid(width, height, pose, fov=1.5 * PI),
+            "equidistant 270": cls.equidistant(width, height, pose, fov=1.5 * PI),
+            "equisolid 360": cls.equisolid(width, height, pose, fov=2 * PI),
+        }
 
     @property
     def domain(self) -> Domain:

@@ -3,53 +3,35 @@
 import json
 from typing import Any
 
-import numpy as np
-
 from mpcam.cameras.base import Camera, given_fields
-from mpcam.cameras.camera_triangles import CameraTriangles
-from mpcam.cameras.double_sphere import DoubleSphere
-from mpcam.cameras.kannala_brandt import KannalaBrandt
-from mpcam.cameras.orthographic import Orthographic
-from mpcam.cameras.pinhole import Pinhole
-from mpcam.cameras.profiles import PROFILES, Profile
-from mpcam.cameras.radial import Radial
-from mpcam.cameras.unified_omni import UnifiedOmni
+from mpcam.cameras.registry import MODELS, is_registered
+from mpcam.cameras.tables import plain_value
 from mpcam.errors import InputError
 
 SCHEMA = 1
-
-MODELS: dict[str, type[Camera]] = {
-    model.__name__: model
-    for model in (Pinhole, Orthographic, Radial, KannalaBrandt, DoubleSphere, UnifiedOmni, CameraTriangles)
-}
 
 
 def camera_to_dict(camera: Camera) -> dict[str, Any]:
     """Model name, schema version and every field, as numbers, strings and nested lists.
 
-    Raises InputError for a camera whose profile is a user's own function, which no file can hold.
+    Raises InputError for a camera whose class is not in the register, or whose profile is a user's own function: no
+    file can hold them.
     """
-    result: dict[str, Any] = {"schema": SCHEMA, "model": type(camera).__name__}
-    for name in given_fields(camera):
-        value = getattr(camera, name)
-        if isinstance(value, Profile):
-            if PROFILES.get(value.name) is not value:
-                raise InputError(
-                    f"a camera with the custom profile {value.name!r} cannot be written: only "
-                    f"{', '.join(PROFILES)} can; keep its function in your program"
-                )
-            value = value.name
-        elif hasattr(value, "shape"):
-            table = np.asarray(value)
-            value = (table if table.dtype.kind in "iu" else table.astype(np.float64)).tolist()
-        elif isinstance(value, tuple):
-            value = [float(number) for number in value]
-        result[name] = value
-    return result
+    name = type(camera).__name__
+    if not is_registered(camera):
+        raise InputError(
+            f"a {name} cannot be written: the register of cameras has {', '.join(MODELS)}; "
+            f"add yours, mpcam.cameras.MODELS[{name!r}] = {name}, or keep it in your program"
+        )
+    fields = {field: plain_value(getattr(camera, field)) for field in given_fields(camera)}
+    return {"schema": SCHEMA, "model": name, **fields}
 
 
 def camera_from_dict(data: dict[str, Any]) -> Camera:
-    """The camera that `camera_to_dict` described; raises InputError for unknown models, schemas and fields."""
+    """The camera that `camera_to_dict` described: lists of numbers come back as the tuples that fields hold.
+
+    Raises InputError for unknown models, schemas and fields.
+    """
     fields = dict(data)
     schema, name = fields.pop("schema", SCHEMA), fields.pop("model", None)
     if schema != SCHEMA:
@@ -61,10 +43,15 @@ def camera_from_dict(data: dict[str, Any]) -> Camera:
     unknown = sorted(set(fields) - known)
     if unknown:
         raise InputError(f"camera model {name} has no field {unknown[0]!r}: allowed are {', '.join(sorted(known))}")
+    fields = {key: tuple(value) if _numbers(value) else value for key, value in fields.items()}
     try:
         return model(**fields)
     except TypeError as error:
         raise InputError(f"camera model {name}: {error}") from None
+
+
+def _numbers(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(item, (int, float)) for item in value)
 
 
 def camera_to_json(camera: Camera) -> str:

@@ -1,11 +1,14 @@
 """The unified omnidirectional model: one sphere, or ellipsoid, and a pinhole; in closed form both ways."""
 
 import dataclasses
-from typing import Any, Self
+import math
+from typing import Annotated, Any, Self
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import FARTHEST, NEARLY_PI, Calibrated
-from mpcam.errors import InputError
+from mpcam.cameras.fields import Limits, Number, Positive, Share
+from mpcam.cameras.tables import arguments
+from mpcam.errors import InputError, KeyProblem
 from mpcam.math import PI, Array, atan2, cos, library, maximum, minimum, safe_sqrt, sin, sqrt, where
 
 _ENDLESS = 1e15  # whose square float32 can hold
@@ -29,14 +32,14 @@ class UnifiedOmni(Calibrated, Camera):
 
     width: int
     height: int
-    fx: Any
-    fy: Any
-    cx: Any
-    cy: Any
-    alpha: Any
-    beta: Any = 1.0
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    alpha: Share
+    beta: Positive = 1.0
     camera_from_world: Any = None
-    max_angle: Any = PI
+    max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
@@ -45,8 +48,6 @@ class UnifiedOmni(Calibrated, Camera):
 
     def __post_init__(self) -> None:
         self._check_frame()
-        check_alpha(self)
-        self._check_number("beta", 0)
         self._check_lens()
 
     @classmethod
@@ -60,7 +61,7 @@ class UnifiedOmni(Calibrated, Camera):
         cy: Any,
         xi: Any,
         camera_from_world: Any = None,
-        max_angle: Any = PI,
+        max_angle: Number = PI,
     ) -> Self:
         """r = rho / (z + xi norm(x, y, z)) in units of gamma_x, gamma_y: Mei and Rives 2007; Kalibr's omni, OpenCV's.
 
@@ -73,6 +74,35 @@ class UnifiedOmni(Calibrated, Camera):
         return cls(
             width, height, gamma_x * share, gamma_y * share, cx, cy, xi * share, 1.0, camera_from_world, max_angle
         )
+
+    @classmethod
+    def from_table(
+        cls,
+        width: int,
+        height: int,
+        alpha: Share | None = None,
+        beta: Positive | None = None,
+        xi: Annotated[float, Limits(at_least=0)] | None = None,
+        **rest: Any,
+    ) -> Self:
+        """From the keys of a scene file: `alpha`, with `beta` or 1, or Mei's `xi`, which `focal` is then given for."""
+        if (alpha is None) == (xi is None):
+            raise InputError("give either alpha (and beta) or xi")
+        lens = arguments(cls, width, height, rest)
+        if xi is None:
+            return cls(**lens, alpha=alpha, beta=1.0 if beta is None else beta)
+        if beta is not None:
+            raise KeyProblem("beta", "give alpha with it, not xi")
+        return cls.mei(gamma_x=lens.pop("fx"), gamma_y=lens.pop("fy"), **lens, xi=xi)
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
+        """A common lens, and a mirror and pinhole of 210 degrees."""
+        frame = (width, height, 0.4 * width, 0.39 * width, 0.51 * width, 0.48 * height)
+        return {
+            "unified_omni": cls(*frame, 0.45, 1.1, camera_from_world),
+            "catadioptric": cls.mei(*frame, 1.2, camera_from_world, math.radians(105)),
+        }
 
     @property
     def xi(self) -> Array:
@@ -125,14 +155,6 @@ def _at_least_zero(name: str, value: Any) -> Any:
     if not 0 <= number < float("inf"):
         raise InputError(f"UnifiedOmni.mei({name}={value!r}): a finite number from 0 is needed")
     return number
-
-
-def check_alpha(camera: Camera) -> None:
-    """See that alpha is a number from 0 to 1; arrays of other libraries pass."""
-    camera._check_number("alpha")
-    alpha: Any = getattr(camera, "alpha")  # noqa: B009
-    if library(alpha) == "numpy" and not 0 <= alpha <= 1:
-        raise InputError(f"{type(camera).__name__}(alpha={alpha!r}): a number from 0 to 1 is needed")
 
 
 def denominator(alpha: Array, side: Array, across: Array, ahead: Array, d: Array) -> Array:

@@ -16,28 +16,13 @@ def load_camera(path_or_name: str | Path) -> "Camera":
     are what `load_scene` reads. Raises InputError for files that are missing, unreadable or without a camera, and for
     calibrations of several cameras.
     """
-    from mpcam.cameras.serialize import camera_from_json
-    from mpcam.io.images import read_camera
+    from mpcam.io.camera_files import SUFFIXES, read_camera_file
     from mpcam.io.scenes import load_scene
 
     kind = Path(path_or_name).suffix.lower()
-    if kind == ".exr":
-        camera = read_camera(path_or_name)
-        if camera is None:
-            raise InputError(f"{path_or_name}: has no camera in its header: give an EXR that mpcam wrote with one")
-        return camera
     if kind in (".yaml", ".yml", ".txt") or Path(path_or_name).name == "transforms.json":
         return _only(path_or_name)
-    if kind != ".json":
-        return load_scene(path_or_name).scene.camera
-    try:
-        return camera_from_json(Path(path_or_name).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path_or_name}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path_or_name}: is not text: give a camera that camera_to_json wrote") from None
-    except InputError as error:
-        raise InputError(f"{path_or_name}: {error}") from None
+    return read_camera_file(path_or_name) if kind in SUFFIXES else load_scene(path_or_name).scene.camera
 
 
 def _only(path: str | Path) -> "Camera":

@@ -1,30 +1,26 @@
 """The camera of a scene file: the model that its table names, and a place from which it sees the meshes."""
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mpcam.cameras import DoubleSphere, KannalaBrandt, Orthographic, Pinhole, Radial, UnifiedOmni
-from mpcam.cameras.profiles import PROFILES
+from mpcam.cameras.base import Camera
+from mpcam.cameras.radial import Radial
+from mpcam.cameras.registry import MODELS, snake_case
+from mpcam.cameras.serialize import camera_to_dict
+from mpcam.cameras.tables import fits_a_table, from_table, table_keys, to_table
 from mpcam.errors import InputError
-from mpcam.io.scene_tables import (
-    CameraTable,
-    DoubleSphereTable,
-    KannalaBrandtTable,
-    LensTable,
-    OrthographicTable,
-    PinholeTable,
-    RadialTable,
-    UnifiedOmniTable,
-)
+from mpcam.io.camera_files import read_camera_file
+from mpcam.io.camera_tables import CameraFile, CameraTable, model_of
 from mpcam.io.scene_text import SceneText
 from mpcam.math.pose import look_at
 
 # Half the angle that the meshes may take up: near enough for a fisheye to show its curvature, and outside of them.
 _WIDEST = math.radians(65)
-
-Frame = tuple[int, int, float, float, float, float]  # width, height, fx, fy, cx, cy
+_SAMPLES = 65  # along each side of an image
 
 
 def default_camera(bounds: np.ndarray, up: str = "z", size: tuple[int, int] = (512, 512)) -> Radial:
@@ -36,82 +32,53 @@ def default_camera(bounds: np.ndarray, up: str = "z", size: tuple[int, int] = (5
     return Radial.paraboloid(*size, camera_from_world=_overview(bounds, math.pi, up))
 
 
-def build_camera(table: CameraTable, bounds: np.ndarray, text: SceneText) -> Any:
+def build_camera(table: CameraTable | CameraFile, bounds: np.ndarray, folder: Path, text: SceneText) -> Camera:
     """The camera that a [camera] table describes; bounds (2, 3) of the meshes place it where it gives no pose.
 
     Raises InputError, with the line of the key, for poses that are incomplete or given twice, for fields of view that
     the projection cannot reach, and for what the camera itself refuses.
     """
-    width, height = table.size
+    model = model_of(table)
+    if isinstance(table, CameraFile):
+        with text.at("camera", "file"):
+            camera = _from_file(folder / table.file, model)
+        posed = table.camera_from_world is not None or table.eye is not None or table.target is not None
+        return camera.with_pose(_pose(table, bounds, camera, text)) if posed else camera
+    given = {key: value for key in table_keys(model) if (value := getattr(table, key)) is not None}
     with text.at("camera"):
-        if isinstance(table, RadialTable):
-            _check_field_of_view(table, text)
-            pose = _pose(table, bounds, math.radians(table.fov), text)
-            return Radial(width, height, table.projection, camera_from_world=pose, fov=math.radians(table.fov))
-        if isinstance(table, PinholeTable):
-            return _pinhole(table, bounds, text)
-        if isinstance(table, OrthographicTable):
-            scale = table.scale or _fitting_scale(bounds, table.size)
-            return Orthographic(width, height, scale=scale, camera_from_world=_pose(table, bounds, 0.0, text))
-        if isinstance(table, LensTable):
-            return _lens(table, bounds, text)
-        raise NotImplementedError(f"no camera for {type(table).__name__}")
+        if model.ray_geometry == "parallel" and "scale" not in given:  # no place makes their view wider
+            given["scale"] = _fitting_scale(bounds, table.size)
+        camera = from_table(model, *table.size, given)
+        return camera.with_pose(_pose(table, bounds, camera, text))
 
 
-def _pinhole(table: PinholeTable, bounds: np.ndarray, text: SceneText) -> Pinhole:
-    width, height = table.size
-    if table.focal is None:
-        if table.center is not None:
-            raise text.error(("camera", "center"), "give camera.focal too, or leave center out")
-        focal = 0.5 * width / math.tan(0.5 * math.radians(60.0 if table.fov is None else table.fov))
-        fx, fy = focal, focal
-    elif table.fov is not None:
-        raise text.error(("camera", "fov"), "give fov or focal, not both")
-    else:
-        fx, fy = table.focal
-    cx, cy = table.center or (0.5 * width, 0.5 * height)
-    narrowest = 2 * math.atan(min(0.5 * width / fx, 0.5 * height / fy))
-    return Pinhole(width, height, fx, fy, cx, cy, _pose(table, bounds, narrowest, text))
+def camera_to_toml(camera: Camera) -> str:
+    """A camera as the table [camera] of a scene file, which makes an equal one (angles: but for rounding of degrees).
+
+    Raises InputError for models that consist of arrays, which a table names a file of, and for cameras that no file can
+    hold.
+    """
+    table = camera_to_dict(camera)
+    model = MODELS[table["model"]]
+    if not fits_a_table(model):
+        raise InputError(
+            f"a {model.__name__} is too large for a table: write camera_to_json(camera) to a file, and name that, "
+            f'model = "{snake_case(model.__name__)}", file = "camera.json"'
+        )
+    size, pose = [camera.width, camera.height], table["camera_from_world"]
+    keys = {"model": snake_case(model.__name__), "size": size, **to_table(camera), "camera_from_world": pose}
+    # JSON's texts, lists and numbers are TOML's, too
+    return "\n".join(["[camera]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items())]) + "\n"
 
 
-def _lens(table: LensTable, bounds: np.ndarray, text: SceneText) -> Any:
-    width, height = table.size
-    center = table.center or (0.5 * width, 0.5 * height)
-    frame: Frame = (width, height, *table.focal, *center)
-    rest: dict[str, Any] = {"max_angle": math.radians(0.5 * table.fov)}
-    if isinstance(table, KannalaBrandtTable):
-        camera = KannalaBrandt(*frame, table.k, **rest)
-    elif isinstance(table, DoubleSphereTable):
-        camera = DoubleSphere(*frame, table.xi, table.alpha, **rest)
-    elif isinstance(table, UnifiedOmniTable):
-        camera = _unified(table, frame, rest, text)
-    else:
-        raise NotImplementedError(f"no camera for {type(table).__name__}")
-    nearest = [min(c, size - c) / f for c, size, f in zip(center, table.size, table.focal, strict=True)]
-    narrowest = 2 * float(camera.angle_at(max(min(nearest), 0.0)))
-    return camera.with_pose(_pose(table, bounds, narrowest, text))
+def _from_file(path: Path, model: type[Camera]) -> Camera:
+    camera = read_camera_file(path)
+    if type(camera) is not model:
+        raise InputError(f"{path} holds a {type(camera).__name__}: give model = {snake_case(type(camera).__name__)!r}")
+    return camera
 
 
-def _unified(table: UnifiedOmniTable, frame: Frame, rest: dict[str, Any], text: SceneText) -> UnifiedOmni:
-    if (table.alpha is None) == (table.xi is None):
-        raise text.error(("camera",), "give either alpha (and beta) or xi")
-    if table.xi is None:
-        return UnifiedOmni(*frame, table.alpha, 1.0 if table.beta is None else table.beta, **rest)
-    if table.beta is not None:
-        raise text.error(("camera", "beta"), "give alpha with it, not xi")
-    return UnifiedOmni.mei(*frame, table.xi, **rest)
-
-
-def _check_field_of_view(table: RadialTable, text: SceneText) -> None:
-    profile = PROFILES[table.projection]
-    limit = 2 * math.degrees(profile.limit)
-    if table.fov > limit or (table.fov == limit and not profile.limit_included):
-        end = "up to" if profile.limit_included else "below"
-        problem = f"the projection {table.projection} reaches {end} {limit:g} degrees"
-        raise text.error(("camera", "fov"), problem)
-
-
-def _pose(table: CameraTable, bounds: np.ndarray, fov: float, text: SceneText) -> Any:
+def _pose(table: CameraTable | CameraFile, bounds: np.ndarray, camera: Camera, text: SceneText) -> Any:
     if table.up is not None and not any(table.up):
         raise text.error(("camera", "up"), "give a direction, e.g. [0, 0, 1]")
     if table.camera_from_world is not None:
@@ -121,13 +88,28 @@ def _pose(table: CameraTable, bounds: np.ndarray, fov: float, text: SceneText) -
         return np.array(table.camera_from_world)
     up = table.up or (0.0, 0.0, 1.0)
     if table.eye is None and table.target is None:
-        return _overview(bounds, fov, "z", up)
+        return _overview(bounds, _field_of_view(camera), "z", up)
     if table.eye is None or table.target is None:
         given, other = ("eye", "target") if table.target is None else ("target", "eye")
         raise text.error(("camera", given), f"give camera.{other} too, or neither of them")
     if table.eye == table.target:
         raise text.error(("camera", "target"), "this is where the eye is: give a point to look at")
     return look_at(table.eye, table.target, up)
+
+
+def _field_of_view(camera: Camera) -> float:
+    """Full angle of the cone around the axis that the image shows, radians; 0 for parallel rays.
+
+    Its border is seen at the border of the image, or where the view ends within it.
+    """
+    if camera.ray_geometry == "parallel":
+        return 0.0
+    along, (width, height) = np.linspace(0.0, 1.0, _SAMPLES), (camera.width, camera.height)
+    u, v = np.meshgrid(width * along, height * along)
+    ray = camera.with_pose(np.eye(4)).ray(np.stack([u, v], -1))
+    angle = np.arccos(np.clip(np.where(ray.valid, ray.direction[..., 2], 1.0), -1.0, 1.0))
+    border = ray.valid & ((u == 0) | (u == width) | (v == 0) | (v == height))
+    return 2.0 * float(angle[border].min() if border.any() else angle.max())
 
 
 def _overview(bounds: np.ndarray, fov: float, axis: str, up: Any = None) -> np.ndarray:

@@ -3,17 +3,15 @@
 Angles are in degrees, lengths in scene units, colours linear RGB (one number stands for a grey).
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
 Vector = tuple[float, float, float]
-Row = tuple[float, float, float, float]
 Positive = Annotated[float, Meta(gt=0)]
 # no limits on these: msgspec 0.22 crashes in garbage collection on a limited number that may also be a tuple
 Scale = float | Vector
 Color = float | Vector
-Pixels = Annotated[int, Meta(ge=1, le=32768)]
 
 
 class Table(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -74,69 +72,6 @@ class EnvironmentTable(Table, frozen=True):
     size: Annotated[int, Meta(ge=8, le=16384)] | None = None  # pixels along a side of the two views kept of it
 
 
-class CameraTable(Table, tag_field="model", frozen=True):
-    """[camera]: keys of every model. Without a pose, the camera is put where it sees all meshes."""
-
-    size: tuple[Pixels, Pixels] = (512, 512)  # width, height
-    eye: Vector | None = None
-    target: Vector | None = None
-    up: Vector | None = None  # default: +z
-    camera_from_world: tuple[Row, Row, Row, Row] | None = None  # instead of eye and target
-
-
-class RadialTable(CameraTable, tag="radial", frozen=True):
-    """model = "radial": fisheye projections; fov is the full angle across the image circle."""
-
-    projection: Literal["paraboloid", "cosine_sphere", "equisolid", "equidistant"] = "paraboloid"
-    fov: Annotated[float, Meta(gt=0, le=360)] = 180.0
-
-
-class PinholeTable(CameraTable, tag="pinhole", frozen=True):
-    """model = "pinhole": fov is the angle across the width (default 60); or focal and centre in pixels."""
-
-    fov: Annotated[float, Meta(gt=0, lt=180)] | None = None
-    focal: tuple[Positive, Positive] | None = None
-    center: tuple[float, float] | None = None  # default: the middle of the image
-
-
-class OrthographicTable(CameraTable, tag="orthographic", frozen=True):
-    """model = "orthographic": scale in pixels per scene unit; the default shows all meshes."""
-
-    scale: Positive | None = None
-
-
-class LensTable(CameraTable, frozen=True, kw_only=True):
-    """Keys of the calibrated lens models, in pixels; the centre of the top left pixel is at (0.5, 0.5).
-
-    fov: twice the largest angle between a ray and the axis; the model's own limit holds too.
-    """
-
-    focal: tuple[Positive, Positive]
-    center: tuple[float, float] | None = None  # default: the middle of the image
-    fov: Annotated[float, Meta(gt=0, le=360)] = 360.0
-
-
-class KannalaBrandtTable(LensTable, tag="kannala_brandt", frozen=True, kw_only=True):
-    """model = "kannala_brandt": r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
-
-    k: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-
-
-class DoubleSphereTable(LensTable, tag="double_sphere", frozen=True, kw_only=True):
-    """model = "double_sphere": Usenko's model."""
-
-    xi: Annotated[float, Meta(gt=-1)]
-    alpha: Annotated[float, Meta(ge=0, le=1)]
-
-
-class UnifiedOmniTable(LensTable, tag="unified_omni", frozen=True, kw_only=True):
-    """model = "unified_omni": alpha and beta of the enhanced unified model, or xi of Mei's."""
-
-    alpha: Annotated[float, Meta(ge=0, le=1)] | None = None
-    beta: Positive | None = None  # default: 1
-    xi: Annotated[float, Meta(ge=0)] | None = None
-
-
 class DirectionalTable(Table, tag_field="type", tag="directional", frozen=True):
     """[[light]] type = "directional": direction is the way that the light travels."""
 
@@ -191,15 +126,7 @@ class SceneTable(Table, frozen=True):
     """The whole file. Without `light`, one directional light comes from behind the camera; `light = []` means none."""
 
     mesh: list[MeshTable]
-    camera: (
-        RadialTable
-        | PinholeTable
-        | OrthographicTable
-        | KannalaBrandtTable
-        | DoubleSphereTable
-        | UnifiedOmniTable
-        | None
-    ) = None
+    camera: Any = None  # read by its own tables: see camera_tables
     light: list[DirectionalTable | PointTable] | None = None
     ambient: Color = 0.15
     background: Color = 0.0

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
-from mpcam.errors import InputError
+from mpcam.errors import InputError, KeyProblem
 from mpcam.io.toml_lines import KeyPath, key_lines, line_of
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -37,6 +37,7 @@ class SceneText:
 
     def __init__(self, name: str, text: str):
         self.name = name
+        self.top: list[str] = []  # keys that may stand above the first [table]
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
             self.lines = key_lines(text)
@@ -61,23 +62,32 @@ class SceneText:
             yield
         except SceneError:
             raise
+        except KeyProblem as error:
+            raise self.error((*path, error.key), error.problem) from None
         except InputError as error:
             raise self.error(path, str(error)) from None
 
-    def read(self, kind: type[T]) -> T:
-        """The text as a record; raises InputError for unknown or missing keys and for values of the wrong kind."""
-        try:
-            return msgspec.convert(self.data, kind)
-        except msgspec.ValidationError as error:
-            raise self._explained(str(error), kind) from None
+    def read(self, kind: type[T], table: str | None = None) -> T:
+        """The text, or one table of it, as a record.
 
-    def _explained(self, message: str, kind: type) -> InputError:
+        Raises InputError for unknown or missing keys and for values of the wrong kind.
+        """
+        if table is None:
+            self.top = _keys(inspect.type_info(kind))
+        data = self.data if table is None else self.data[table]
+        try:
+            return msgspec.convert(data, kind)
+        except msgspec.ValidationError as error:
+            raise self._explained(str(error), kind, data, () if table is None else (table,)) from None
+
+    def _explained(self, message: str, kind: type, data: Any, base: KeyPath) -> InputError:
         where = _WHERE.search(message)
         message = message[: where.start()] if where else message
         path = tuple(key or int(index) for key, index in _STEP.findall(where["path"])) if where else ()
-        allowed, data = _kind_at(inspect.type_info(kind), self.data, path)
+        allowed, data = _kind_at(inspect.type_info(kind), data, path)
+        path = (*base, *path)
         if unknown := _UNKNOWN.match(message):
-            top = _keys(inspect.type_info(kind)) if path else []
+            top = self.top if path else []
             return self.error((*path, unknown[1]), _suggestion(unknown[1], _keys(allowed), top))
         if missing := _MISSING.match(message):
             wanted, _ = _kind_at(allowed, data, (missing[1],))
@@ -184,6 +194,8 @@ def _described(kind: inspect.Type) -> str:
         limits = (("above", kind.gt), ("from", kind.ge), ("up to", kind.le), ("below", kind.lt))
         parts = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
         return " ".join(["a whole number" if isinstance(kind, inspect.IntType) else "a number", *parts])
+    if isinstance(kind, inspect.BoolType):
+        return "true or false"
     if isinstance(kind, inspect.StrType):
         return "a text in quotes"
     if isinstance(kind, inspect.TupleType):

@@ -1,11 +1,24 @@
 """Stiff and extreme cases, model by model, against oracles that do not share the code under test."""
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
-MODELS = ("radial", "camera-triangles")
+from mpcam.cameras.registry import MODELS, snake_case
+from mpcam.errors import InputError
+
+
+def models() -> list[str]:
+    """Cameras of the register that have cases: a module of that name is here."""
+    names = map(snake_case, MODELS)
+    return [name.replace("_", "-") for name in names if find_spec(f"mpcam.stress.{name}")]
 
 
 def suite(model: str) -> Any:
-    """The module that runs a model's cases: `run(triangles, points, progress)` and the largest error, LIMIT."""
+    """The module that runs a model's cases: `run(triangles, points, progress)` and the largest error, LIMIT.
+
+    model: one of `models()`. Raises InputError for others.
+    """
+    if model not in models():
+        raise InputError(f"stress {model!r}: allowed are {', '.join(models())}")
     return import_module(f"mpcam.stress.{model.replace('-', '_')}")
