@@ -39,6 +39,9 @@ class Profile:
     on [0, limit) or [0, limit], radians. convex: whether 1/f is a convex, increasing-from-tangent function of
     cot(theta), which makes the images of straight lines bulge away from the centre, so
     that tangents bound them; bounds fall back to annular sectors where it is False.
+
+    toward, direction: radius and angle once more, where they have a form in the unit direction's distance from the
+    axis and height, (sin theta, cos theta). It keeps what theta has lost to rounding near pi.
     """
 
     name: str
@@ -48,6 +51,8 @@ class Profile:
     limit: float
     limit_included: bool
     convex: bool
+    toward: Callable[[Array, Array], Array] | None = None
+    direction: Callable[[Array], tuple[Array, Array]] | None = None
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Built-in profiles are pickled and copied by name: their functions are lambdas, and there is one of each."""
