@@ -179,7 +179,8 @@ class Calibrated:
         limit = self.angle_limit()
         edge = limit if self.limit is None else self.edge
         convex = self.limit is not None and self.convex
-        view = _View(self._profile(limit, convex), 2.0 * edge, self.radius_at(edge))
+        profile = self._profile(limit, convex)
+        view = _View(profile, 2.0 * edge, profile.radius(edge))
         inner, outer = bound(view, a, b, c), outer_bound(view, limit, a, b, c)
         low, high = [], []
         for i, (centre, focal) in enumerate(((self.cx, self.fx), (self.cy, self.fy))):

@@ -25,6 +25,7 @@ from mpcam.math import (
     minimum,
     sin,
     tan,
+    where,
 )
 
 _SAMPLES = 2001
@@ -70,6 +71,11 @@ def _unit(x: Array) -> Array:
     return maximum(minimum(x, 1.0), -1.0)
 
 
+def _half_tangent(side: Array, ahead: Array) -> Array:
+    behind = ahead < 0
+    return where(behind, (1.0 - ahead) / where(behind, side, 1.0), side / where(behind, 1.0, 1.0 + ahead))
+
+
 PARABOLOID = Profile(
     "paraboloid",
     lambda theta: tan(0.5 * theta),
@@ -78,6 +84,8 @@ PARABOLOID = Profile(
     PI,
     False,
     True,
+    _half_tangent,
+    lambda r: (2.0 * r / (1.0 + r * r), (1.0 - r * r) / (1.0 + r * r)),
 )
 """Stereographic projection, r = tan(theta / 2): keeps angles; lines become circle arcs."""
 

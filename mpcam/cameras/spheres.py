@@ -11,6 +11,7 @@ from typing import Any
 
 from mpcam.cameras.calibrated import FARTHEST, Calibrated
 from mpcam.cameras.profiles import Profile
+from mpcam.cameras.symmetric import within
 from mpcam.errors import InputError
 from mpcam.math import Array, atan2, cos, epsilon, library, maximum, minimum, safe_sqrt, sin, sqrt, where
 
@@ -63,7 +64,7 @@ class Spheres(Calibrated):
         across, height, d = self._last_sphere(side, ahead)
         below = self._below(side, across, height, d)
         rising = _mixed(1 - self.alpha, self.alpha, -self._excess(), across, height, d)
-        return self.turning(side, ahead) * rising / (d * below * below)
+        return (self.turning(side, ahead) / below) * (rising / d) / below
 
     def angle_at(self, r: Array) -> Array:
         """theta of r, up to the end of the domain."""
@@ -101,8 +102,13 @@ class Spheres(Calibrated):
         return 2 * self.alpha - 1 if self.excess is None else self.excess
 
     def _profile(self, limit: Array, convex: bool = False) -> Profile:
-        profile = super()._profile(limit, convex)
-        return dataclasses.replace(profile, toward=self.radius_toward, direction=self.direction_at)
+        profile, rim = super()._profile(limit, convex), self._rim()
+
+        def radius(theta: Array) -> Array:
+            # Up to the rim f may rise by any amount between two neighboring angles near pi.
+            return where(within(limit, theta), rim, self.radius_at(theta))
+
+        return dataclasses.replace(profile, radius=radius, toward=self.radius_toward, direction=self.direction_at)
 
     def _check_alpha(self) -> None:
         """See that alpha is a number from 0 to 1 (arrays of other libraries pass), and derive `excess`."""

@@ -59,7 +59,7 @@ def _direction(profile: Profile, r: Array) -> tuple[Array, Array]:
     if profile.direction is not None:
         return profile.direction(r)
     theta = profile.angle(r)
-    return sin(theta), cos(theta)
+    return maximum(sin(theta), 0.0), cos(theta)  # float32 rounds pi up, to where the sine is negative
 
 
 def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Array]:
@@ -75,7 +75,7 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
     off_axis = squared > smallest(squared)
     rho = sqrt(where(off_axis, squared, 1.0))
     theta = atan2(where(off_axis, rho, 0.0), z)
-    radius = _radius(profile, theta, rho, z)
+    radius = radius_of(profile, theta, rho, z)
     ahead = where(z > 0, z, 1.0)
     ratio = where(off_axis, radius / rho, profile.slope(0.0 * rho) / ahead)
     # Straight behind the camera the image is the whole circle; its point to the right stands for it.
@@ -83,7 +83,7 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
     return ratio * x + behind, ratio * y, theta
 
 
-def _radius(profile: Profile, theta: Array, rho: Array, z: Array) -> Array:
+def radius_of(profile: Profile, theta: Array, rho: Array, z: Array) -> Array:
     """Radius of a direction at theta = atan2(rho, z), or of the profile's reach."""
     reach = minimum(theta, profile.reach)
     if profile.toward is None:

@@ -20,7 +20,11 @@ def invert_increasing(
     target = detach(value)
     zero = 0.0 * (function(target * 0.0 + low) - target)  # of the type that the result has
     below, above = zero + low, zero + high
-    x = bracketed_newton(lambda x: function(x) - target, slope, below, above, 0.5 * (below + above))
+    # Newton's step from the lower end, near which bisection would halve the error and no more.
+    rise = slope(below)
+    guess = below + (target - function(below)) / where(rise > 0, rise, 1.0)
+    start = where((rise > 0) & (guess > below) & (guess < above), guess, 0.5 * (below + above))
+    x = bracketed_newton(lambda x: function(x) - target, slope, below, above, start)
     first, last = target <= function(zero + low), target >= function(zero + high)
     x = where(first, zero + low, where(last, zero + high, x))
     x, gradient = detach(x), detach(slope(x))
