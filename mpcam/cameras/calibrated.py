@@ -93,11 +93,15 @@ class Calibrated:
             )
         numbers = [self.fx, self.fy, self.cx, self.cy, self.max_angle, *self._shape()]
         known = library(*numbers) == "numpy"
+        self._derive()
         limit = float(minimum(self.max_angle, self.largest_angle())) if known else None
         object.__setattr__(self, "limit", limit)
         object.__setattr__(self, "rim", float(self.radius_at(limit)) if limit else None)
         object.__setattr__(self, "edge", self._image_angle() if limit else None)
         object.__setattr__(self, "convex", bool(limit) and self._bulges())
+
+    def _derive(self) -> None:
+        """Set what a model derives from its checked numbers, before its domain is found."""
 
     def _shape(self) -> list[Array]:
         values = [getattr(self, name) for name in self.shape_fields]

@@ -53,10 +53,13 @@ class DoubleSphere(Spheres, Camera):
         self._check_frame()
         self._check_number("xi", -1)
         self._check_alpha()
-        if library(self.xi) == "numpy":
-            for name, end in (("front", 1 + self.xi), ("back", 1 - self.xi)):
-                object.__setattr__(self, name, end)
         self._check_lens()
+
+    def _derive(self) -> None:
+        super()._derive()
+        if library(self.xi) == "numpy":
+            object.__setattr__(self, "front", 1 + self.xi)
+            object.__setattr__(self, "back", 1 - self.xi)
 
     def elevation(self, side: Array, ahead: Array) -> Array:
         """xi + ahead, by 1 - |ahead| = side^2 / (1 + |ahead|)."""

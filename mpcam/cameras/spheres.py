@@ -111,12 +111,13 @@ class Spheres(Calibrated):
         return dataclasses.replace(profile, radius=radius, toward=self.radius_toward, direction=self.direction_at)
 
     def _check_alpha(self) -> None:
-        """See that alpha is a number from 0 to 1 (arrays of other libraries pass), and derive `excess`."""
+        """See that alpha is a number from 0 to 1; arrays of other libraries pass."""
         self._check_number("alpha")  # pyright: ignore[reportAttributeAccessIssue]
-        known = library(self.alpha) == "numpy"
-        if known and not 0 <= self.alpha <= 1:
+        if library(self.alpha) == "numpy" and not 0 <= self.alpha <= 1:
             raise InputError(f"{type(self).__name__}(alpha={self.alpha!r}): a number from 0 to 1 is needed")
-        object.__setattr__(self, "excess", 2 * self.alpha - 1 if known else None)
+
+    def _derive(self) -> None:
+        object.__setattr__(self, "excess", 2 * self.alpha - 1 if library(self.alpha) == "numpy" else None)
 
 
 def _direction(theta: Array) -> tuple[Array, Array]:

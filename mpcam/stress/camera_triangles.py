@@ -5,8 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.three_rays import project
 from mpcam.stress import camera_triangle_bounds as bounds
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, pose
 from mpcam.stress.report import EPS, LIMIT, Case, Progress, StressRow, check_counts, run_cases
 from mpcam.stress.three_ray_inputs import KINDS
 from mpcam.stress.three_ray_truth import truths
@@ -24,7 +27,21 @@ def run(triangles: int = 100_000, points: int = 100, progress: Progress | None =
     check_counts(triangles=triangles, points=points)
     cases = [*projection_cases(points), ("not finite", lambda: [not_finite_row()])]
     cases += [(f"bounds, {kind}", partial(bounds.bound_rows, kind, triangles)) for kind in bounds.KINDS]
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
+
+
+def narrow_view(distance: float, width: float) -> CameraTriangles:
+    """For distant eyes (see `distant`): a plane pinhole of two camera triangles."""
+    camera_from_world = pose(distance)
+    turn, shift = camera_from_world[:3, :3], camera_from_world[:3, 3]
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * width / distance + [0, 0, 1]
+    return CameraTriangles(
+        vertices=(corners - shift) @ turn,
+        faces=[[0, 1, 2], [0, 2, 3]],
+        directions=corners @ turn,
+        resolution=VIEW,
+        ray_scale="plane",
+    )
 
 
 def projection_cases(count: int, seed: int = 1) -> list[Case]:

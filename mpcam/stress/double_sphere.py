@@ -3,6 +3,8 @@
 from typing import Any
 
 from mpcam.cameras.double_sphere import DoubleSphere
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.exact import Parameter, Real, largest_angle
 from mpcam.stress.lenses import Definition, lens_cases
 from mpcam.stress.report import LIMIT as LIMIT
@@ -57,10 +59,17 @@ def definition(camera: DoubleSphere) -> Definition:
     return Definition(radius, largest, numbers)
 
 
+def narrow_view(distance: float, width: float) -> DoubleSphere:
+    """For distant eyes: see `distant`."""
+    xi = -0.2
+    focal = (1 + xi) * focal_length(distance, width)
+    return DoubleSphere(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, xi, 0.6, pose(distance))
+
+
 def run(triangles: int = 50_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []
     for name, camera in cameras().items():
         cases += lens_cases(name, camera, definition(camera), points, triangles)
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)

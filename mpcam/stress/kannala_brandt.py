@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.kannala_brandt import KannalaBrandt
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.exact import Real, parameters
 from mpcam.stress.lenses import Definition, lens_cases
 from mpcam.stress.report import LIMIT as LIMIT
@@ -69,10 +71,16 @@ def definition(camera: KannalaBrandt) -> Definition:
     return Definition(radius, largest, parameters(*camera.k))
 
 
+def narrow_view(distance: float, width: float) -> KannalaBrandt:
+    """For distant eyes: see `distant`."""
+    focal = focal_length(distance, width)
+    return KannalaBrandt(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, (0.1, -0.05, 0.01, 0), pose(distance))
+
+
 def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []
     for name, camera in cameras().items():
         cases += lens_cases(name, camera, definition(camera), points, triangles)
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)

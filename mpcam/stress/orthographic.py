@@ -3,6 +3,8 @@
 import numpy as np
 
 from mpcam.cameras.orthographic import Orthographic
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, pose
 from mpcam.stress.exact import DIGITS, Exact, Real
 from mpcam.stress.inputs import central_points, pixels
 from mpcam.stress.projections import image_rows, ray_rows
@@ -45,13 +47,18 @@ def out_of_range(count: int, seed: int = 4) -> np.ndarray:
     return rng.choice([-1.0, 1.0], (count, 3)) * 10.0 ** rng.uniform(lowest, lowest + 10, (count, 3))
 
 
+def narrow_view(distance: float, width: float) -> Orthographic:
+    """For distant eyes: see `distant`."""
+    return Orthographic(VIEW, VIEW, 0.5 * VIEW / width, camera_from_world=pose(distance))
+
+
 def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases: list[Case] = []
     for name, camera in cameras().items():
         cases += _cases(name, camera, points, triangles)
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
 
 
 def _cases(name: str, camera: Orthographic, points: int, triangles: int) -> list[Case]:

@@ -4,6 +4,7 @@ float64 is NumPy's. float32 is that of the kernels, with the camera's numbers on
 float32 points and pixels, and of the camera's numbers as they were given.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,9 @@ from mpcam.stress.report import EPS, LIMIT, StressRow
 def image_rows(name: str, camera: Any, exact: Exact, points: dict[str, np.ndarray]) -> list[StressRow]:
     """`local_project` of points (N, 3) by kind, for cameras with one image of a point; and of points that are none."""
     rows = []
-    for kind, given in points.items():
-        for precision in EPS:
-            rounded = _rounded(given, precision)
-            rows.append(
-                judge_images(name, f"images, {kind}", precision, exact, rounded, images(camera, rounded, precision))
-            )
+    for kind, precision, given in _rounded(points):
+        found = images(camera, given, precision)
+        rows.append(judge_images(name, f"images, {kind}", precision, exact, given, found))
     for precision in EPS:
         pixel, depth, valid = images(camera, BAD_POINTS, precision)
         invented = int(valid.sum() + (~np.isfinite(pixel)).sum() + (~np.isfinite(depth)).sum())
@@ -32,10 +30,9 @@ def image_rows(name: str, camera: Any, exact: Exact, points: dict[str, np.ndarra
 def ray_rows(name: str, camera: Any, exact: Exact, pixels: dict[str, np.ndarray]) -> list[StressRow]:
     """`local_ray` of pixels (N, 2) by kind, and of pixels that are none."""
     rows = []
-    for kind, given in pixels.items():
-        for precision in EPS:
-            rounded = _rounded(given, precision)
-            rows.append(judge_rays(name, f"rays, {kind}", precision, exact, rounded, rays(camera, rounded, precision)))
+    for kind, precision, given in _rounded(pixels):
+        found = rays(camera, given, precision)
+        rows.append(judge_rays(name, f"rays, {kind}", precision, exact, given, found))
     for precision in EPS:
         origin, direction, valid = rays(camera, BAD_PIXELS, precision)
         invented = int(valid.sum() + (~np.isfinite(origin)).sum() + (~np.isfinite(direction)).sum())
@@ -43,11 +40,15 @@ def ray_rows(name: str, camera: Any, exact: Exact, pixels: dict[str, np.ndarray]
     return rows
 
 
-def _rounded(given: np.ndarray, precision: str) -> np.ndarray:
-    """Rows as a precision holds them, without those that it cannot."""
-    with np.errstate(over="ignore"):
-        rounded = given.astype(precision).astype(np.float64)
-    return rounded[np.isfinite(rounded).all(axis=1)]
+def _rounded(sets: dict[str, np.ndarray]) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Kind, precision and rows as that precision holds them, without those that it cannot."""
+    for kind, given in sets.items():
+        for precision in EPS:
+            with np.errstate(over="ignore"):
+                rounded = given.astype(precision).astype(np.float64)
+            rounded = rounded[np.isfinite(rounded).all(axis=1)]
+            if len(rounded):
+                yield kind, precision, rounded
 
 
 def images(camera: Any, points: np.ndarray, precision: str) -> tuple[np.ndarray, ...]:

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.radial import Radial
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, pose
 from mpcam.stress.exact import Real, parameters
 from mpcam.stress.lenses import Definition, lens_cases
 from mpcam.stress.regions import BoundOf, known_bounds
@@ -62,10 +64,15 @@ def _quads(camera: Any, a: Any, b: Any, c: Any) -> list[Any]:
     return [(*camera.local_bound_quads(a, b, c), ())]
 
 
+def narrow_view(distance: float, width: float) -> Radial:
+    """For distant eyes: see `distant`."""
+    return Radial.equidistant(VIEW, VIEW, pose(distance), fov=2 * np.arctan(width / distance))
+
+
 def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []
     for name, camera in cameras().items():
         cases += lens_cases(name, camera, definition(camera), points, triangles, _bounds(camera))
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)

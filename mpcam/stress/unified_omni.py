@@ -3,6 +3,8 @@
 from typing import Any
 
 from mpcam.cameras.unified_omni import UnifiedOmni
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.exact import Parameter, Real, largest_angle
 from mpcam.stress.lenses import Definition, lens_cases
 from mpcam.stress.report import LIMIT as LIMIT
@@ -53,10 +55,16 @@ def definition(camera: UnifiedOmni) -> Definition:
     )
 
 
+def narrow_view(distance: float, width: float) -> UnifiedOmni:
+    """For distant eyes: see `distant`."""
+    focal = focal_length(distance, width)
+    return UnifiedOmni(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, 0.6, 1.1, pose(distance))
+
+
 def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []
     for name, camera in cameras().items():
         cases += lens_cases(name, camera, definition(camera), points, triangles)
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
