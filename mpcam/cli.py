@@ -234,29 +234,42 @@ def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=Tr
 
 
 @app.command
-def stress(model: str, /, *, triangles: int = 1_000_000, points: int = 200, json: bool = False) -> int:
-    """Run a camera model on its stiff and extreme cases, against 50 digits and dense sampling.
+def stress(
+    model: str | None = None, /, *, triangles: int | None = None, points: int | None = None, json: bool = False
+) -> int:
+    """Run camera models on their stiff and extreme cases, against 50 digits and dense sampling; all without a name.
 
     Args:
-        model: A camera by its name, e.g. radial or camera-triangles; a wrong one lists those that there are.
-        triangles: Random triangles per camera whose boxes are checked; for camera triangles, pairs per kind of rays.
-        points: Points per camera and kind whose images are checked.
-        json: Print the cases as JSON.
+        model: A camera model, such as kannala-brandt.
+        triangles: Random triangles whose bounds are checked, per camera; for camera triangles, pairs per kind of rays.
+        points: Points and pixels per camera and kind.
+        json: Print every row of every camera as JSON.
     """
     from rich.console import Console
 
     from mpcam.comparison.progress import bar
-    from mpcam.stress import report, suite
+    from mpcam.stress import models, report, suite
 
-    chosen = suite(model)
+    given = {name: value for name, value in (("triangles", triangles), ("points", points)) if value is not None}
+    suites = {name: suite(name) for name in ([model] if model else models())}
+    report.check_counts(**given)
     check_machine()
-    with bar(Console(stderr=True), f"stress {model}") as progress:
-        cases = chosen.run(triangles, points, progress)
+    console, found, good = Console(width=None if sys.stdout.isatty() else 130), [], True
+    for name, chosen in suites.items():
+        with bar(Console(stderr=True), f"stress {name}") as progress:
+            rows = chosen.run(**given, progress=progress)
+        wrong = [row for row in rows if not row.good(chosen.LIMIT)]
+        good = good and not wrong
+        found += report.as_dicts(name, rows)
+        if not json:
+            report.print_rows(
+                name, report.joined(rows, report.case_of if model else report.kind_of), chosen.LIMIT, console
+            )
+            if wrong:
+                report.print_rows(f"{name}: what failed", wrong, chosen.LIMIT, console)
     if json:
-        print_json(report.as_dicts(cases))
-    else:
-        report.print_cases(cases, chosen.LIMIT, Console(width=None if sys.stdout.isatty() else 110))
-    return 0 if all(case.good(chosen.LIMIT) for case in cases) else EXIT_FAILURE
+        print_json(found)
+    return 0 if good else EXIT_FAILURE
 
 
 @app.command

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from mpcam.cameras.profiles import Profile
+from mpcam.cameras.symmetric import radius_of
 from mpcam.cameras.types import Box
 from mpcam.math import (
     PI,
@@ -38,6 +39,9 @@ from mpcam.math import (
 _PIECES = 8
 _HALVINGS = 5
 _FAR = 1e9  # pixels; stands for infinity
+
+ON_AXIS = 1e-30
+"""Squared angle from the axis below which the projection is a scaling; float32 holds its inverse."""
 
 
 class RadialCamera(Protocol):
@@ -68,13 +72,13 @@ def image_and_slopes(camera: RadialCamera, p: Vector, *velocities: Vector) -> tu
     x, y, z = p
     squared = x * x + y * y
     length_squared = squared + z * z
-    off_axis = squared > 1e-12 * length_squared
+    off_axis = squared > ON_AXIS * length_squared
     rho = sqrt(where(off_axis, squared, 1.0))
     ex, ey = where(off_axis, x / rho, 1.0), where(off_axis, y / rho, 0.0)
     theta = atan2(sqrt(squared), z)
-    reach = minimum(theta, camera.profile.reach)
     scale = camera.pixels_per_radius
-    r, slope = scale * camera.profile.radius(reach), scale * camera.profile.slope(reach)
+    r = scale * radius_of(camera.profile, theta, rho, z)
+    slope = scale * camera.profile.slope(minimum(theta, camera.profile.reach))
     flat = slope / where(z > 0, z, 1.0)
     sideways = where(off_axis, r / rho, flat)
     pixel = vector(camera.cx + sideways * x, camera.cy + sideways * y)
@@ -105,8 +109,9 @@ def tangent_limit(m0: Vector, g0: Vector, m1: Vector, g1: Vector, i: int, span: 
 def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
     """Box of the image of the great-circle arc between unit directions a and b, within the field of view."""
     along = dot(a, b)
-    tangent = normalize(vector(*(b[i] - a[i] * along for i in range(3))))
-    length = atan2(norm(cross(a, b)), along)
+    across = cross(a, b)
+    tangent = normalize(cross(across, a))  # not from b - a along: in a narrow view, nothing but rounding is left of it
+    length = atan2(norm(across), along)
     start, span, valid, twice = visible_part(camera, a, tangent, length)
 
     def at(s: Array) -> tuple[Vector, Vector]:

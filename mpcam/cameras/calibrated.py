@@ -13,16 +13,13 @@ import numpy as np
 from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_rough
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import Profile, bulges_outward
-from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
+from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray, within
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
-from mpcam.math import PI, Array, Vector, detach, epsilon, library, maximum, minimum, vector, where
+from mpcam.math import PI, Array, Vector, detach, library, maximum, minimum, vector, where
 
 FARTHEST = 1e6
 """Images end at so many focal lengths from the centre, where a formula would go on to infinity."""
-
-NEARLY_PI = PI - 1e-6
-"""Domains of formulas with sin(theta) end here: float32 has no number so near to pi that its sine would be right."""
 
 _FAR = 1e9  # pixels; stands for infinity
 _SAMPLES = 2001
@@ -45,8 +42,9 @@ class Calibrated:
     """Rays, images and boxes from the functions r = f(theta), f' and the inverse that a model supplies.
 
     Derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
-    edge, an angle beyond which nothing lands in the image; convex, whether images of straight lines bulge away from the
-    centre up to there (see `Profile`). They are None and False in cameras whose parameters are traced by JAX.
+    rim, its radius in focal lengths; edge, an angle beyond which nothing lands in the image; convex, whether images of
+    straight lines bulge away from the centre up to there (see `Profile`). They are None and False in cameras whose
+    parameters are traced by JAX.
     """
 
     width: int
@@ -58,6 +56,7 @@ class Calibrated:
     camera_from_world: Any
     max_angle: Any
     limit: Any
+    rim: Any
     edge: Any
     convex: bool
 
@@ -91,26 +90,30 @@ class Calibrated:
             )
         numbers = [self.fx, self.fy, self.cx, self.cy, self.max_angle, *self._shape()]
         known = library(*numbers) == "numpy"
+        self._derive()
         limit = float(minimum(self.max_angle, self.largest_angle())) if known else None
         object.__setattr__(self, "limit", limit)
-        object.__setattr__(self, "edge", self._image_angle(limit) if limit else None)
+        object.__setattr__(self, "rim", float(self.radius_at(limit)) if limit else None)
+        object.__setattr__(self, "edge", self._image_angle() if limit else None)
         object.__setattr__(self, "convex", bool(limit) and self._bulges())
+
+    def _derive(self) -> None:
+        """Set what a model derives from its checked numbers, before its domain is found."""
 
     def _shape(self) -> list[Array]:
         values = [getattr(self, name) for name in self.shape_fields]
         return [number for value in values for number in (value if isinstance(value, tuple) else (value,))]
 
-    def _image_angle(self, limit: float) -> float:
+    def _image_angle(self) -> float:
         """An angle at which all radii that occur in the image are passed."""
-        theta = np.linspace(0.0, limit, _SAMPLES)
         across = max(abs(self.cx), abs(self.width - self.cx)) / self.fx
         down = max(abs(self.cy), abs(self.height - self.cy)) / self.fy
-        passed = int(np.searchsorted(self.radius_at(theta), _MARGIN * np.hypot(across, down)))
-        return float(theta[min(passed, _SAMPLES - 1)])
+        return float(self.angle_at(min(_MARGIN * float(np.hypot(across, down)), self.rim)))
 
     def _bulges(self) -> bool:
-        theta = np.linspace(0.0, self.edge, _SAMPLES)
-        return bulges_outward(theta, np.asarray(self.radius_at(theta)))
+        """On equal steps of theta and, where f rises at different rates, on equal steps of r."""
+        theta, r = np.linspace(0.0, self.edge, _SAMPLES), np.linspace(0.0, self.radius_at(self.edge), _SAMPLES)
+        return all(bulges_outward(angles, np.asarray(self.radius_at(angles))) for angles in (theta, self.angle_at(r)))
 
     def angle_limit(self) -> Array:
         """Largest angle of the domain, radians; a constant to gradients."""
@@ -119,14 +122,17 @@ class Calibrated:
     def _profile(self, limit: Array, convex: bool = False) -> Profile:
         return Profile(type(self).__name__, self.radius_at, self.slope_at, self.angle_at, limit, True, convex)
 
+    def _rim(self) -> Array:
+        """Radius of the domain's image, focal lengths; a constant to gradients."""
+        return detach(self.radius_at(self.angle_limit())) if self.rim is None else self.rim
+
     @property
     def domain(self) -> Domain:
         """The largest angle, and the radius in pixels (the larger one of an ellipse) of the image that ends there.
 
         The radius is None where f goes to infinity.
         """
-        limit = self.angle_limit()
-        radius = self.radius_at(limit)
+        limit, radius = self.angle_limit(), self._rim()
         if library(radius) == "numpy" and radius > 0.9 * FARTHEST:
             return Domain(limit, None)
         return Domain(limit, maximum(self.fx, self.fy) * radius)
@@ -134,9 +140,8 @@ class Calibrated:
     def local_ray(self, pixel: Vector) -> Ray:
         """Ray of a pixel in the camera frame; valid in the image of the domain."""
         u, v, valid = finite_pixel(pixel)
-        limit = self.angle_limit()
         x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
-        return symmetric_ray(self._profile(limit), x, y, detach(self.radius_at(limit)), valid)
+        return symmetric_ray(self._profile(self.angle_limit()), x, y, self._rim(), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
         """Image of a point in the camera frame; valid in the domain, not at the camera's centre."""
@@ -146,8 +151,7 @@ class Calibrated:
         """Pixel of a point, and whether it lies in the domain; beyond it, the pixel is on its rim."""
         limit = self.angle_limit()
         x, y, theta = symmetric_image(self._profile(limit), point)
-        inside = theta <= limit + 4 * PI * epsilon(theta)
-        return vector(self.cx + self.fx * x, self.cy + self.fy * y), inside
+        return vector(self.cx + self.fx * x, self.cy + self.fy * y), within(theta, limit)
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
         """Box of the curved triangle, exact to about 0.01 pixel for what lies in the image.
@@ -176,7 +180,8 @@ class Calibrated:
         limit = self.angle_limit()
         edge = limit if self.limit is None else self.edge
         convex = self.limit is not None and self.convex
-        view = _View(self._profile(limit, convex), 2.0 * edge, self.radius_at(edge))
+        profile = self._profile(limit, convex)
+        view = _View(profile, 2.0 * edge, profile.radius(edge))
         inner, outer = bound(view, a, b, c), outer_bound(view, limit, a, b, c)
         low, high = [], []
         for i, (centre, focal) in enumerate(((self.cx, self.fx), (self.cy, self.fy))):

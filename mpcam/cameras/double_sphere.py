@@ -5,14 +5,13 @@ import math
 from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.calibrated import FARTHEST, NEARLY_PI, Calibrated
 from mpcam.cameras.fields import Limits, Number, Positive, Share
-from mpcam.cameras.unified_omni import denominator, sphere_border, sphere_direction, widest_radius
-from mpcam.math import PI, Array, atan2, cos, maximum, minimum, safe_sqrt, sin, sqrt, where
+from mpcam.cameras.spheres import Spheres
+from mpcam.math import PI, Array, maximum, safe_sqrt, where
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class DoubleSphere(Calibrated, Camera):
+class DoubleSphere(Spheres, Camera):
     """r = rho / (alpha d2 + (1 - alpha) (xi d1 + z)), d1 = norm(x, y, z), d2 = norm(x, y, xi d1 + z), rho = norm(x, y).
 
     Usenko, Demmel and Cremers 2018, equations 40 to 51. A point lands on a unit sphere, from there, seen from a centre
@@ -24,6 +23,9 @@ class DoubleSphere(Calibrated, Camera):
     comes first: on the second sphere that is z2 = -w1 d2, with w1 = alpha / (1 - alpha) or its inverse, whichever is
     below 1. (Equation 43 puts that border at another angle, by taking the second sphere's point for one of the first:
     for xi = -0.5, alpha = 0.1, it takes in points behind the pinhole.)
+
+    Derived fields: front = 1 + xi and back = 1 - xi, before xi is rounded to float32: near -1 and 1 the image depends
+    on them. At xi = -1 the axis would have no image, and the image no centre.
 
     Raises InputError for sizes below 1, focal lengths that are not positive, xi and alpha out of range, numbers that
     are not finite, an angle outside (0, pi], and poses that are not rigid.
@@ -40,7 +42,11 @@ class DoubleSphere(Calibrated, Camera):
     camera_from_world: Any = None
     max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
+    rim: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
+    excess: Any = dataclasses.field(default=None, init=False)
+    front: Any = dataclasses.field(default=None, init=False)
+    back: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("xi", "alpha")
@@ -58,38 +64,36 @@ class DoubleSphere(Calibrated, Camera):
             "centre outside": cls(*frame, 1.5, 0.3, camera_from_world, math.radians(115)),
         }
 
-    def _parts(self, theta: Array) -> tuple[Array, Array, Array]:
-        """sin theta, d2 and the denominator of r, for a point at distance 1."""
-        side, ahead = sin(theta), self.xi + cos(theta)
-        second = sqrt(maximum(side * side + ahead * ahead, 1e-30))
-        return side, second, denominator(self.alpha, side, side, ahead, second)
+    def elevation(self, side: Array, ahead: Array) -> Array:
+        """xi + ahead, by 1 - |ahead| = side^2 / (1 + |ahead|)."""
+        front, back = self._ends()
+        less = side * side / (1 + abs(ahead))
+        return where(ahead < 0, less - back, front - less)
 
-    def radius_at(self, theta: Array) -> Array:
-        """r = f(theta) in focal lengths, theta in radians from the axis."""
-        side, _, below = self._parts(theta)
-        return side / below
+    def turning(self, side: Array, ahead: Array) -> Array:
+        """1 + xi ahead, which is ahead height + side^2 of a unit direction."""
+        front, back = self._ends()
+        bent = self.xi * (side * side / (1 + abs(ahead)))
+        return where(ahead < 0, back + bent, front - bent)
 
-    def slope_at(self, theta: Array) -> Array:
-        """f'(theta)."""
-        side, second, below = self._parts(theta)
-        return (cos(theta) * below + side * side * (self.alpha * self.xi / second + 1 - self.alpha)) / (below * below)
+    def seen_at(self, across: Array, height: Array) -> tuple[Array, Array]:
+        """The unit direction to a point of the second sphere: along that sphere's radius to the first."""
+        xi, (front, back) = self.xi, self._ends()
+        squeeze = front * back  # 1 - xi^2
+        root = safe_sqrt(height * height + squeeze * across * across)
+        shifted = xi * height
+        far = where(shifted < 0, squeeze / where(shifted < 0, root - shifted, 1.0), root + shifted)
+        return across * maximum(far, 0.0), height * root - xi * across * across
 
-    def angle_at(self, r: Array) -> Array:
-        """theta of r, up to the end of the domain."""
-        return minimum(self._inverse(r), self.angle_limit())
-
-    def _inverse(self, r: Array) -> Array:
-        """theta of r: from the image to the second sphere, and along its radius to the first."""
-        side, ahead = sphere_direction(self.alpha, minimum(r, widest_radius(self.alpha)))
-        square = side * side + ahead * ahead
-        far = maximum(self.xi * ahead + safe_sqrt(square - self.xi * self.xi * side * side), 0.0)
-        return atan2(far * side, far * ahead - self.xi * square)
-
-    def largest_angle(self) -> Array:
-        """Where r is largest, or FARTHEST, radians."""
-        xi, (side, ahead) = self.xi, sphere_border(self.alpha)
-        far = maximum(xi * ahead + safe_sqrt(1 - xi * xi * side * side), 0.0)
-        border = minimum(atan2(far * side, far * ahead - xi), self._inverse(FARTHEST + 0.0 * xi))
+    def border(self) -> tuple[Array, Array]:
+        """Unit direction from which on r does not increase, or is infinite."""
+        side, ahead = super().border()
         # A centre outside of the first sphere sees it twice.
-        border = where(xi > 1, atan2(safe_sqrt(xi * xi - 1), -1.0 + 0.0 * xi), border)
-        return minimum(border, NEARLY_PI)
+        outside = self.xi > 1
+        inverse = 1 / where(outside, self.xi, 1.0)
+        front, back = self._ends()
+        return where(outside, safe_sqrt(-front * back) * inverse, side), where(outside, -inverse, ahead)
+
+    def _ends(self) -> tuple[Array, Array]:
+        """1 + xi and 1 - xi."""
+        return (1 + self.xi, 1 - self.xi) if self.front is None else (self.front, self.back)

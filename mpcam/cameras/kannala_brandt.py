@@ -43,6 +43,7 @@ class KannalaBrandt(Calibrated, Camera):
     camera_from_world: Any = None
     max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
+    rim: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
 
@@ -108,12 +109,12 @@ def _turn(k: tuple[float, ...]) -> float:
 
 
 def _turn_on_grid(derivative: tuple[Array, ...]) -> Array:
-    """The same for JAX, on ever finer grids; at most 1e-10 smaller."""
+    """The same for JAX, on ever finer grids; at most 2e-14 smaller."""
     import jax.numpy as jnp
 
     grid = np.arange(1, _NODES + 1) / _NODES
     start, width = 0.0, PI
-    for _ in range(3):
+    for _ in range(4):
         theta = start + width * grid
         falls = polynomial(derivative, theta * theta) <= 0
         start = start + width * jnp.where(falls.any(), jnp.argmax(falls), _NODES) / _NODES

@@ -54,11 +54,11 @@ class Orthographic(Camera):
         return Ray(vector(x, y, zero), vector(zero, zero, zero + 1.0), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """Image of a point in the camera frame; valid from the camera plane on."""
+        """Image of a point in the camera frame; valid from the camera plane on, where its pixel is finite."""
         x, y, z = point
-        valid = (z >= 0) & isfinite(x) & isfinite(y) & isfinite(z)
-        x, y, z = (where(valid, value, 0.0) for value in (x, y, z))
-        return (Projection(self.local_image(vector(x, y, z))[0], z, valid),)
+        u, v = self.local_image(point)[0]
+        valid = (z >= 0) & isfinite(u) & isfinite(v) & isfinite(z)
+        return (Projection(vector(where(valid, u, self.cx), where(valid, v, self.cy)), where(valid, z, 0.0), valid),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, also behind the camera plane, and whether it lies in front."""

@@ -11,6 +11,7 @@ ends: the crossing bounds it along each image axis, and across the chord.
 from typing import NamedTuple, Protocol
 
 from mpcam.cameras.profiles import Profile
+from mpcam.cameras.symmetric import radius_of
 from mpcam.cameras.types import Box
 from mpcam.math import (
     PI,
@@ -71,14 +72,13 @@ def symmetric_vertex_view(profile: Profile, view: Array, end: Array, point: Vect
     x, y, z = point
     squared = x * x + y * y
     length_squared = squared + z * z
-    off_axis = squared > 1e-12 * length_squared
+    off_axis = squared > 1e-30 * length_squared
     safe, length = where(off_axis, squared, 1.0), where(length_squared > 0, length_squared, 1.0)
     rho = sqrt(safe)
     theta = atan2(sqrt(squared), z)
-    reach = minimum(theta, profile.reach)
-    slope = profile.slope(reach)
+    slope = profile.slope(minimum(theta, profile.reach))
     flat = slope / where(z > 0, z, 1.0)
-    s = where(off_axis, profile.radius(reach) / rho, flat)
+    s = where(off_axis, radius_of(profile, theta, rho, z) / rho, flat)
     q = slope / length
     p = where(off_axis, (q * z - s) / safe, 0.0)
     # Edges of at most 45 degrees between corners nearer than 153 degrees keep away from the point behind the eye.

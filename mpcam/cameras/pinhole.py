@@ -87,12 +87,14 @@ class Pinhole(Camera):
         return Ray(vector(zero, zero, zero), normalize(vector(x, y, zero + 1.0)), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """Image of a point in the camera frame; valid in front of the camera plane."""
+        """Image of a point in the camera frame; valid in front of the camera plane, where its pixel is finite."""
         x, y, z = point
         valid = (z > 0) & isfinite(x) & isfinite(y) & isfinite(z)
         x, y, z = where(valid, x, 0.0), where(valid, y, 0.0), where(valid, z, 1.0)
-        point = vector(x, y, z)
-        return (Projection(self.local_image(point)[0], norm(point), valid),)
+        u, v = self.local_image(vector(x, y, z))[0]
+        finite = isfinite(u) & isfinite(v)
+        pixel = vector(where(finite, u, self.cx), where(finite, v, self.cy))
+        return (Projection(pixel, norm(vector(x, y, z)), valid & finite),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, and whether it lies in front of the camera plane; the pixel means nothing elsewhere."""

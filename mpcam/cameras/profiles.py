@@ -25,6 +25,7 @@ from mpcam.math import (
     minimum,
     sin,
     tan,
+    where,
 )
 
 _SAMPLES = 2001
@@ -39,6 +40,9 @@ class Profile:
     on [0, limit) or [0, limit], radians. convex: whether 1/f is a convex, increasing-from-tangent function of
     cot(theta), which makes the images of straight lines bulge away from the centre, so
     that tangents bound them; bounds fall back to annular sectors where it is False.
+
+    toward, direction: radius and angle once more, where they have a form in the unit direction's distance from the
+    axis and height, (sin theta, cos theta). It keeps what theta has lost to rounding near pi.
     """
 
     name: str
@@ -48,6 +52,8 @@ class Profile:
     limit: float
     limit_included: bool
     convex: bool
+    toward: Callable[[Array, Array], Array] | None = None
+    direction: Callable[[Array], tuple[Array, Array]] | None = None
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Built-in profiles are pickled and copied by name: their functions are lambdas, and there is one of each."""
@@ -65,6 +71,11 @@ def _unit(x: Array) -> Array:
     return maximum(minimum(x, 1.0), -1.0)
 
 
+def _half_tangent(side: Array, ahead: Array) -> Array:
+    behind = ahead < 0
+    return where(behind, (1.0 - ahead) / where(behind, side, 1.0), side / where(behind, 1.0, 1.0 + ahead))
+
+
 PARABOLOID = Profile(
     "paraboloid",
     lambda theta: tan(0.5 * theta),
@@ -73,6 +84,8 @@ PARABOLOID = Profile(
     PI,
     False,
     True,
+    _half_tangent,
+    lambda r: (2.0 * r / (1.0 + r * r), (1.0 - r * r) / (1.0 + r * r)),
 )
 """Stereographic projection, r = tan(theta / 2): keeps angles; lines become circle arcs."""
 

@@ -12,11 +12,11 @@ from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
-from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray
+from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray, within
 from mpcam.cameras.tables import degrees, plain_value
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError, KeyProblem
-from mpcam.math import PI, Array, Vector, epsilon, library, vector
+from mpcam.math import PI, Array, Vector, library, vector
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -172,8 +172,7 @@ class Radial(Camera):
         """Pixel of a point, also beyond the rim as far as f goes on, and whether it lies within the field of view."""
         x, y, theta = symmetric_image(self.profile, point)
         scale = self.pixels_per_radius
-        inside = theta <= 0.5 * self.fov + 4 * PI * epsilon(theta)
-        return vector(self.cx + scale * x, self.cy + scale * y), inside
+        return vector(self.cx + scale * x, self.cy + scale * y), within(theta, 0.5 * self.fov)
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
         """Box of the curved triangle, exact to about 0.01 pixel (annular sectors for profiles that are not convex)."""

@@ -18,6 +18,7 @@ from mpcam.math import (
     minimum,
     norm,
     sin,
+    smallest,
     sqrt,
     vector,
     where,
@@ -39,8 +40,8 @@ def symmetric_ray(profile: Profile, x: Array, y: Array, rim: Array, valid: Array
     valid = valid & (squared <= rim * rim)
     off_axis = valid & (squared > 0)
     distance = where(off_axis, distance, 1.0)  # 1 stands for points that do not matter
-    theta = profile.angle(where(off_axis, distance, 0.0))
-    sideways = where(off_axis, sin(theta) / distance, 0.0)
+    side, ahead = _direction(profile, where(off_axis, distance, 0.0))
+    sideways = where(off_axis, side / distance, 0.0)
     zero = 0.0 * x
     inside = where(valid, 1.0, 0.0)
     # At the centre the slope of the direction in the image point is 1 / f'(0).
@@ -48,9 +49,17 @@ def symmetric_ray(profile: Profile, x: Array, y: Array, rim: Array, valid: Array
     direction = vector(
         where(off_axis, x * sideways * inside, x * centre * inside),
         where(off_axis, y * sideways * inside, y * centre * inside),
-        where(valid, cos(theta), 1.0),
+        where(valid, ahead, 1.0),
     )
     return Ray(vector(zero, zero, zero), direction, valid)
+
+
+def _direction(profile: Profile, r: Array) -> tuple[Array, Array]:
+    """Unit direction of a radius: distance from the axis, and height."""
+    if profile.direction is not None:
+        return profile.direction(r)
+    theta = profile.angle(r)
+    return maximum(sin(theta), 0.0), cos(theta)  # float32 rounds pi up, to where the sine is negative
 
 
 def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Array]:
@@ -63,15 +72,29 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
     scale = 1.0 / where(largest > 0, largest, 1.0)
     x, y, z = x * scale, y * scale, z * scale
     squared = x * x + y * y
-    off_axis = squared > 0
+    off_axis = squared > smallest(squared)
     rho = sqrt(where(off_axis, squared, 1.0))
     theta = atan2(where(off_axis, rho, 0.0), z)
-    reach = minimum(theta, profile.reach)
+    radius = radius_of(profile, theta, rho, z)
     ahead = where(z > 0, z, 1.0)
-    ratio = where(off_axis, profile.radius(reach) / rho, profile.slope(0.0 * rho) / ahead)
+    ratio = where(off_axis, radius / rho, profile.slope(0.0 * rho) / ahead)
     # Straight behind the camera the image is the whole circle; its point to the right stands for it.
-    behind = where(off_axis | (z >= 0), 0.0, profile.radius(reach))
+    behind = where(off_axis | (z >= 0), 0.0, radius)
     return ratio * x + behind, ratio * y, theta
+
+
+def radius_of(profile: Profile, theta: Array, rho: Array, z: Array) -> Array:
+    """Radius of a direction at theta = atan2(rho, z), or of the profile's reach."""
+    reach = minimum(theta, profile.reach)
+    if profile.toward is None:
+        return profile.radius(reach)
+    inside, length = within(theta, profile.reach), sqrt(rho * rho + z * z)
+    return profile.toward(where(inside, rho / length, sin(reach)), where(inside, z / length, cos(reach)))
+
+
+def within(theta: Array, limit: Array) -> Array:
+    """Whether an angle is at most the limit, to rounding."""
+    return theta <= limit * (1.0 + 4.0 * epsilon(theta))
 
 
 class CentredCamera(Protocol):

@@ -5,17 +5,17 @@ import math
 from typing import Annotated, Any, Self
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.calibrated import FARTHEST, NEARLY_PI, Calibrated
 from mpcam.cameras.fields import Limits, Number, Positive, Share
+from mpcam.cameras.spheres import Spheres
 from mpcam.cameras.tables import arguments
 from mpcam.errors import InputError, KeyProblem
-from mpcam.math import PI, Array, atan2, cos, library, maximum, minimum, safe_sqrt, sin, sqrt, where
+from mpcam.math import PI, Array, library, sqrt
 
 _ENDLESS = 1e15  # whose square float32 can hold
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class UnifiedOmni(Calibrated, Camera):
+class UnifiedOmni(Spheres, Camera):
     """r = rho / (alpha d + (1 - alpha) z), d = sqrt(beta rho^2 + z^2), rho = norm(x, y).
 
     The enhanced unified camera model (Khomutenko, Garcia and Martinet 2016, equation 5). With beta = 1 it is the
@@ -41,7 +41,9 @@ class UnifiedOmni(Calibrated, Camera):
     camera_from_world: Any = None
     max_angle: Number = PI
     limit: Any = dataclasses.field(default=None, init=False)
+    rim: Any = dataclasses.field(default=None, init=False)
     edge: Any = dataclasses.field(default=None, init=False)
+    excess: Any = dataclasses.field(default=None, init=False)
     convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("alpha", "beta")
@@ -109,39 +111,23 @@ class UnifiedOmni(Calibrated, Camera):
         """Distance of the pinhole from the sphere's centre, for beta = 1: alpha / (1 - alpha)."""
         return self.alpha / (1 - self.alpha)
 
-    def _parts(self, theta: Array) -> tuple[Array, Array, Array, Array]:
-        """sin theta, cos theta, d and the denominator of r, for a point at distance 1."""
-        side, ahead = sin(theta), cos(theta)
-        across = sqrt(self.beta) * side
-        d = sqrt(across * across + ahead * ahead)
-        return side, ahead, d, denominator(self.alpha, side, across, ahead, d)
+    def stretch(self) -> Array:
+        """across / side."""
+        return sqrt(self.beta)
 
-    def radius_at(self, theta: Array) -> Array:
-        """r = f(theta) in focal lengths, theta in radians from the axis."""
-        side, _, _, below = self._parts(theta)
-        return side / below
+    def elevation(self, side: Array, ahead: Array) -> Array:
+        """Height of a unit direction over the last sphere's centre, which is where the direction starts."""
+        return ahead
 
-    def slope_at(self, theta: Array) -> Array:
-        """f'(theta)."""
-        side, ahead, d, below = self._parts(theta)
-        falling = 1 - self.alpha + self.alpha * (1 - self.beta) * ahead / d
-        return (ahead * below + side * side * falling) / (below * below)
+    def turning(self, side: Array, ahead: Array) -> Array:
+        """ahead height + side^2 of a unit direction."""
+        return 1.0
 
-    def angle_at(self, r: Array) -> Array:
-        """theta of r, up to the end of the domain."""
-        return minimum(self._inverse(r), self.angle_limit())
-
-    def _inverse(self, r: Array) -> Array:
-        """theta of r: that of the unit sphere, which is the ellipsoid scaled by sqrt(beta) across the axis."""
-        scale = sqrt(self.beta)
-        side, ahead = sphere_direction(self.alpha, minimum(r * scale, widest_radius(self.alpha)))
-        return atan2(side / scale, ahead)
-
-    def largest_angle(self) -> Array:
-        """Where r is largest, or FARTHEST, radians."""
-        side, ahead = sphere_border(self.alpha)
-        border = minimum(atan2(side / sqrt(self.beta), ahead), self._inverse(FARTHEST + 0.0 * self.alpha))
-        return minimum(border, NEARLY_PI)
+    def seen_at(self, across: Array, height: Array) -> tuple[Array, Array]:
+        """The unit direction to (across, height) of the unit sphere, which is the ellipsoid stretched."""
+        side = across / sqrt(self.beta)
+        length = sqrt(side * side + height * height)
+        return side / length, height / length
 
 
 def _at_least_zero(name: str, value: Any) -> Any:
@@ -155,33 +141,3 @@ def _at_least_zero(name: str, value: Any) -> Any:
     if not 0 <= number < float("inf"):
         raise InputError(f"UnifiedOmni.mei({name}={value!r}): a finite number from 0 is needed")
     return number
-
-
-def denominator(alpha: Array, side: Array, across: Array, ahead: Array, d: Array) -> Array:
-    """alpha d + (1 - alpha) ahead, d = |(across, ahead)|, without cancellation; at least side / (2 FARTHEST)."""
-    total = maximum(alpha * d + (1 - alpha) * abs(ahead), 1e-30)
-    difference = (alpha * alpha * across * across + (2 * alpha - 1) * ahead * ahead) / total
-    return maximum(where(ahead < 0, difference, total), 0.5 / FARTHEST * side)
-
-
-def sphere_direction(alpha: Array, r: Array) -> tuple[Array, Array]:
-    """Point of the unit sphere (distance from the axis, height), unscaled, with r = side / (alpha + (1 - alpha) ahead).
-
-    The larger root of the quadratic equation for the height.
-    """
-    other = 1 - alpha
-    root = safe_sqrt(1 - (2 * alpha - 1) * r * r)
-    return r * (alpha + other * root), root - alpha * other * r * r
-
-
-def widest_radius(alpha: Array) -> Array:
-    """Largest r on the unit sphere, 1 / sqrt(2 alpha - 1); a large number where there is none."""
-    excess = 2 * alpha - 1
-    finite = excess > FARTHEST**-2
-    return where(finite, 1 / sqrt(where(finite, excess, 1.0)), _ENDLESS)
-
-
-def sphere_border(alpha: Array) -> tuple[Array, Array]:
-    """Unit vector (side, height) to where r stops increasing, or is infinite, on the unit sphere: height -w."""
-    w = minimum(alpha, 1 - alpha) / maximum(alpha, 1 - alpha)
-    return safe_sqrt(1 - w * w), -w

@@ -17,6 +17,7 @@ from mpcam.math.arrays import minimum as minimum
 from mpcam.math.arrays import safe_divide as safe_divide
 from mpcam.math.arrays import safe_sqrt as safe_sqrt
 from mpcam.math.arrays import sin as sin
+from mpcam.math.arrays import smallest as smallest
 from mpcam.math.arrays import sqrt as sqrt
 from mpcam.math.arrays import take as take
 from mpcam.math.arrays import tan as tan

@@ -137,6 +137,11 @@ def epsilon(x: Array) -> float:
     return 2.0**-23 if getattr(x, "dtype", None) == np.float32 else 2.0**-52
 
 
+def smallest(x: Array) -> float:
+    """Smallest number with all its digits in the precision of x: 2**-126 or 2**-1022."""
+    return 2.0**-126 if epsilon(x) > 2.0**-52 else 2.0**-1022
+
+
 def safe_divide(x: Array, y: Array, otherwise: Array = 0.0) -> Array:
     """x / y, and `otherwise` where y is zero; the guard stands on both sides, so gradients stay finite too."""
     nonzero = y != 0

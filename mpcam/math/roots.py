@@ -41,26 +41,27 @@ def bracketed_newton(
 ) -> Array:
     """Root in [below, above] of an increasing function that changes its sign there, from `start`; no derivative.
 
-    Newton's step where it stays inside the bracket and is at most half the step before, bisection otherwise. The three
-    arrays are of the type and shape that the result has. free: length of steps that need not shrink, by default the
-    last places of the bracket's width, since at the root rounding keeps Newton's steps from shrinking; the width itself
-    where the start is so good that Newton converges.
+    Newton's step where it stays inside the bracket and is at most half the last step but one (of the last, it could
+    never be taken to a root at an end of the bracket, since bisection halves its steps too), bisection otherwise. The
+    three arrays are of the type and shape that the result has. free: length of steps that need not shrink, by default
+    the last places of the bracket's width, since at the root rounding keeps Newton's steps from shrinking; the width
+    itself where the start is so good that Newton converges.
     """
-    last_places = 4 * epsilon(below) * (above - below) if free is None else free
+    free = 4 * epsilon(below) * (above - below) if free is None else free
 
-    def step(state: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
-        below, above, x, step_before = state
+    def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
+        below, above, x, last, last_but_one = state
         residual = function(x)
         below = where(residual <= 0, x, below)
         above = where(residual > 0, x, above)
         gradient = slope(x)
         newton = x - residual / where(gradient > 0, gradient, 1.0)
         usable = (gradient > 0) & (newton >= below) & (newton <= above)
-        usable = usable & (absolute(newton - x) <= 0.5 * step_before + last_places)
+        usable = usable & (absolute(newton - x) <= 0.5 * last_but_one + free)
         after = where(residual == 0, x, where(usable, newton, 0.5 * (below + above)))
-        return below, above, after, absolute(after - x)
+        return below, above, after, absolute(after - x), last
 
-    return repeat(step, (below, above, start, above - below), steps)[2]
+    return repeat(step, (below, above, start, above - below, above - below), steps)[2]
 
 
 def repeat(step: Callable[[Any], Any], state: Any, steps: int) -> Any:

@@ -1,5 +1,10 @@
-"""Stiff and extreme cases, model by model, against oracles that do not share the code under test."""
+"""Stiff and extreme cases, model by model, against oracles that do not share the code under test.
 
+The suite of a camera model is the module of this package with the class's name in snake case: it has
+`run(triangles, points, progress)`, which gives the rows, and the largest error that passes, LIMIT.
+"""
+
+import re
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -20,5 +25,5 @@ def suite(model: str) -> Any:
     model: one of `models()`. Raises InputError for others.
     """
     if model not in models():
-        raise InputError(f"stress {model!r}: allowed are {', '.join(models())}")
+        raise InputError(f"stress {model!r}: allowed are {', '.join(models())}, or none of them for all")
     return import_module(f"mpcam.stress.{model.replace('-', '_')}")

@@ -12,15 +12,15 @@ from mpcam.backend import types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.general import BOUNDS, GeneralRasterizer
-from mpcam.stress.report import Case
+from mpcam.stress.report import StressRow
 
 SIDE, FACES, TRIANGLES = 20, 10, 2000
 """Pixels along the short sides of a camera triangle, camera triangles of a camera, and scene triangles before it."""
 KINDS = ("positive", "mixed signs", "grazing", "parallel", "concurrent", "mirror", "lens", "tiny triangles", "needles")
 
 
-def bound_cases(kind: str, pairs: int) -> list[Case]:
-    """One case per bound; pairs: of a camera triangle and a scene triangle, about."""
+def bound_rows(kind: str, pairs: int) -> list[StressRow]:
+    """One row per bound; pairs: of a camera triangle and a scene triangle, about."""
     missed, tried = dict.fromkeys(BOUNDS, 0), 0
     for camera, mesh in scenes(kind, max(1, pairs // (FACES * TRIANGLES))):
         true = pairs_that_hit(camera, mesh)
@@ -28,7 +28,7 @@ def bound_cases(kind: str, pairs: int) -> list[Case]:
         for bound in BOUNDS:
             missed[bound] += abs(true - GeneralRasterizer(camera, mesh, bound).frame().stats.rendered)
     return [
-        Case("camera-triangles", f"{bound}, {kind}", "float32", tried, float("nan"), count, 0)
+        StressRow("random", f"bounds, {bound}, {kind}", "float32", tried, float("nan"), count, 0)
         for bound, count in missed.items()
     ]
 

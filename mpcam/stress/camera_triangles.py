@@ -1,61 +1,67 @@
 """Cameras with three rays at their limits: images of points against 50 digits, in both precisions."""
 
-from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.three_rays import project
-from mpcam.errors import InputError
 from mpcam.stress import camera_triangle_bounds as bounds
-from mpcam.stress.report import Case
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, pose
+from mpcam.stress.report import EPS, LIMIT, Case, Progress, StressRow, check_counts, run_cases
 from mpcam.stress.three_ray_inputs import KINDS
-from mpcam.stress.three_ray_truth import LIMIT, truths
+from mpcam.stress.three_ray_truth import truths
 
 FAR = 1e3
 """Images that are off by more than this many LIMIT belong to no solution."""
 
-MODEL = "camera-triangles"
-Progress = Callable[[int, int, str], None]
 
-
-def run(triangles: int = 1_000_000, points: int = 200, progress: Progress | None = None) -> list[Case]:
+def run(triangles: int = 100_000, points: int = 100, progress: Progress | None = None) -> list[StressRow]:
     """All cases, `points` of each kind and precision. Raises InputError below 1.
 
     triangles: how many pairs of a camera triangle and a scene triangle are looked at for each kind of rays, to find
     pixels that a bound leaves out.
     """
-    if triangles < 1 or points < 1:
-        raise InputError(f"stress: triangles={triangles}, points={points}: at least 1 of each is needed")
-    steps = 2 * len(KINDS) + len(bounds.KINDS)
-
-    def told(done: int, _: int, what: str) -> None:
-        if progress:
-            progress(done, steps, what)
-
-    cases = [*projection_cases(points, progress=told), not_finite_case()]
-    for number, kind in enumerate(bounds.KINDS):
-        told(2 * len(KINDS) + number, steps, f"bounds, {kind}")
-        cases += bounds.bound_cases(kind, triangles)
-    told(steps, steps, "done")
-    return cases
+    check_counts(triangles=triangles, points=points)
+    cases = [*projection_cases(points), ("not finite", lambda: [not_finite_row()])]
+    cases += [(f"bounds, {kind}", partial(bounds.bound_rows, kind, triangles)) for kind in bounds.KINDS]
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
 
 
-def projection_cases(count: int, seed: int = 1, progress: Progress | None = None) -> list[Case]:
+def narrow_view(distance: float, width: float) -> CameraTriangles:
+    """For distant eyes (see `distant`): a plane pinhole of two camera triangles."""
+    camera_from_world = pose(distance)
+    turn, shift = camera_from_world[:3, :3], camera_from_world[:3, 3]
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * width / distance + [0, 0, 1]
+    return CameraTriangles(
+        vertices=(corners - shift) @ turn,
+        faces=[[0, 1, 2], [0, 2, 3]],
+        directions=corners @ turn,
+        resolution=VIEW,
+        ray_scale="plane",
+    )
+
+
+def projection_cases(count: int, seed: int = 1) -> list[Case]:
     """`project` of all kinds in float64 (NumPy) and float32 (Dr.Jit, as kernels run it), against 50 digits."""
     given = [kind(np.random.default_rng(seed), count) for kind in KINDS.values()]
-    v, d, q = [np.concatenate(parts) for parts in zip(*given, strict=True)]
-    cases = []
-    for precision, images in (("float64", _images_double), ("float32", _images_single)):
-        rounded = [x.astype(precision).astype(np.float64) for x in (v, d, q)]
-        found = images(*rounded)
-        for number, kind in enumerate(KINDS):
-            if progress:
-                progress(len(cases), 2 * len(KINDS), f"{kind}, {precision}")
-            part = slice(number * count, (number + 1) * count)
-            eps = float(np.finfo(precision).eps)
-            cases.append(judged(kind, precision, [x[part] for x in rounded], found[:, :, part], eps))
-    return cases
+    inputs = [np.concatenate(parts) for parts in zip(*given, strict=True)]
+
+    @cache
+    def images(precision: str) -> tuple[list[np.ndarray], np.ndarray]:
+        """Inputs as the precision holds them, and their images; at once, so that kernels are compiled once."""
+        rounded = [x.astype(precision).astype(np.float64) for x in inputs]
+        return rounded, (_images_double if precision == "float64" else _images_single)(*rounded)
+
+    def rows(kind: str, number: int, precision: str) -> list[StressRow]:
+        rounded, found = images(precision)
+        part = slice(number * count, (number + 1) * count)
+        return [judged(kind, precision, [x[part] for x in rounded], found[:, :, part], EPS[precision])]
+
+    kinds = [(kind, number, precision) for precision in EPS for number, kind in enumerate(KINDS)]
+    return [(f"{kind}, {precision}", partial(rows, kind, number, precision)) for kind, number, precision in kinds]
 
 
 def _images_double(v: np.ndarray, d: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -75,7 +81,7 @@ def _images_single(v: np.ndarray, d: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.array([[np.broadcast_to(x.numpy(), len(q)) for x in image] for image in images], np.float64)
 
 
-def not_finite_case() -> Case:
+def not_finite_row() -> StressRow:
     """Numbers that are none in each place in turn, and triangles and rays that are nothing."""
     v, d, q = [x[0] for x in KINDS["everywhere"](np.random.default_rng(1), 1)]
     inputs = [(v, 0 * d, q), (0 * v, d, 0 * q), (0 * v + q, d, q), (0 * v, 0 * d, 0 * q)]
@@ -86,16 +92,16 @@ def not_finite_case() -> Case:
             inputs.append(tuple(changed))
     images = [image for given in inputs for image in project(*given)]
     invented = sum(int(image.valid) or not np.isfinite(image[:3]).all() for image in images)
-    return Case(MODEL, "not finite, or nothing", "float64", len(inputs), float("nan"), 0, invented)
+    return StressRow("random", "images, not finite, or nothing", "float64", len(inputs), float("nan"), 0, invented)
 
 
-def judged(kind: str, precision: str, given: Any, found: np.ndarray, eps: float) -> Case:
+def judged(kind: str, precision: str, given: Any, found: np.ndarray, eps: float) -> StressRow:
     """One row: found (3, 4, count) against the truth of each input."""
     worst, missed, invented = 0.0, 0, 0
     for i in range(found.shape[2]):
         one = judge_one(given[0][i], given[1][i], given[2][i], found[:, :, i], eps)
         worst, missed, invented = max(worst, one[0]), missed + one[1], invented + one[2]
-    return Case(MODEL, kind, precision, found.shape[2], worst, missed, invented)
+    return StressRow("random", f"images, {kind}", precision, found.shape[2], worst, missed, invented)
 
 
 def judge_one(v: Any, d: Any, q: Any, found: np.ndarray, eps: float) -> tuple[float, int, int]:

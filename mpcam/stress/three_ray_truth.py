@@ -7,9 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpcam.math import polynomial
-
-LIMIT = 16.0
-"""Largest error that passes, in units of eps times the condition number."""
+from mpcam.stress.report import LIMIT
 
 
 class Truth(NamedTuple):

@@ -1,0 +1,72 @@
+"""Narrow views of the unit sphere from far away, where rounding of the eye's place is large against the scene.
+
+The truth is in closed form: a ray that passes nearer to the center than every triangle's plane hits the mesh, and one
+that passes outside of the sphere through the corners does not. Pixels between are near an edge, and either is right.
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from mpcam.cameras.base import Camera
+from mpcam.cameras.pose import look_at
+from mpcam.stress.report import Case, StressRow
+
+DISTANCES = (100.0, 300.0, 1000.0)
+"""Of the eye from the center of the scene, in half-extents of the scene."""
+
+WIDTHS = (1.2, 0.3, 0.05)
+"""Half of what the image shows at the center of the scene, in half-extents: more than all of it, and parts."""
+
+SIZE, TRIANGLES = 256, 20480
+
+Factory = Callable[[float, float], Camera]
+"""Of a distance and a half width: a camera that far away, with an image that shows about that much to each side."""
+
+
+def pose(distance: float) -> np.ndarray:
+    """camera_from_world of an eye that looks at the origin from so far, along no axis."""
+    return look_at(eye=distance * np.array([0.6, 0.64, 0.48]), target=(0, 0, 0))
+
+
+def focal_length(distance: float, width: float) -> float:
+    """Pixels per unit of the tangent for an image of SIZE pixels that shows `width` to each side."""
+    return 0.5 * SIZE * distance / width
+
+
+def distant_cases(factory: Factory) -> list[Case]:
+    """One case for each distance, over all widths, at any orientation; for every camera that can be rasterized."""
+    return [(f"distant eyes, {distance:g}", partial(_rows, factory, distance)) for distance in DISTANCES]
+
+
+def _rows(factory: Factory, distance: float) -> list[StressRow]:
+    counts = np.sum([distant(factory(distance, width), distance) for width in WIDTHS], axis=0)
+    pixels, missed, invented = map(int, counts)
+    return [StressRow("distant", f"distant eyes, {distance:g}", "float32", pixels, float("nan"), missed, invented)]
+
+
+def distant(camera: Camera, distance: float) -> tuple[int, int, int]:
+    """Pixels that are sure, missed, and invented or at a wrong depth; by `invert`, of the unit sphere's mesh."""
+    from mpcam.geometry.builtin import builtin_mesh
+    from mpcam.rendering.methods import rasterize
+
+    mesh = builtin_mesh("sphere", triangles=TRIANGLES)
+    a, b, c = np.moveaxis(np.asarray(mesh.corners), 1, 0)
+    normals = np.cross(b - a, c - a)
+    inner = float(np.min(np.abs((normals * a).sum(1)) / np.linalg.norm(normals, axis=1)))
+    outer = float(np.linalg.norm(mesh.vertices, axis=1).max())
+    slack = 1e-6 * distance  # what float32 makes of points so far away
+
+    hits = rasterize(camera, mesh, method="invert")
+    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    ray = camera.ray(np.stack([u, v], -1))
+    origin, direction = np.asarray(ray.origin), np.asarray(ray.direction)
+    nearest = -(origin * direction).sum(-1)
+    passing = np.linalg.norm(origin + nearest[..., None] * direction, axis=-1)
+    found, depth = np.asarray(hits.triangle) >= 0, np.asarray(hits.depth, np.float64)
+    inside = ray.valid & (passing < inner - slack) & (nearest > 0)
+    outside = ~ray.valid | (passing > outer + slack)
+    half = np.sqrt(np.maximum(outer**2 - passing**2, 0)), np.sqrt(np.maximum(inner**2 - passing**2, 0))
+    off = found & inside & ((depth < nearest - half[0] - slack) | (depth > nearest - half[1] + slack))
+    return int((inside | outside).sum()), int((inside & ~found).sum()), int((outside & found).sum() + off.sum())
