@@ -4,7 +4,6 @@ The suite of a camera model is the module of this package with the class's name 
 `run(triangles, points, progress)`, which gives the rows, and the largest error that passes, LIMIT.
 """
 
-import re
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
