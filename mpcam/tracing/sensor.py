@@ -94,7 +94,7 @@ def _sensor_class(mi: Any) -> type:
         def __init__(self, properties: Any):
             super().__init__(properties)
             if "camera" not in properties:
-                raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.tracing.sensor(camera)")
+                raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.truth.sensor(camera)")
             self.camera = _read(str(properties["camera"]))
             self.centred = bool(properties.get("centred", False))
             size = self.film().size()
