@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mpcam.cameras import Box as Box
+    from mpcam.cameras import BrownConrady as BrownConrady
     from mpcam.cameras import Camera as Camera
     from mpcam.cameras import CameraTriangles as CameraTriangles
     from mpcam.cameras import Domain as Domain
@@ -81,8 +82,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": (
-        "Box Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile Projection "
-        "Radial Ray UnifiedOmni custom_profile look_at"
+        "Box BrownConrady Camera CameraTriangles Domain DoubleSphere KannalaBrandt Orthographic Pinhole Profile "
+        "Projection Radial Ray UnifiedOmni custom_profile look_at"
     ),
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",

@@ -1,6 +1,7 @@
 """Camera models: ray, project and bound, each exact, one file per model."""
 
 from mpcam.cameras.base import Camera as Camera
+from mpcam.cameras.brown_conrady import BrownConrady as BrownConrady
 from mpcam.cameras.camera_triangles import CameraTriangles as CameraTriangles
 from mpcam.cameras.double_sphere import DoubleSphere as DoubleSphere
 from mpcam.cameras.kannala_brandt import KannalaBrandt as KannalaBrandt

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera, given_fields
+from mpcam.cameras.brown_conrady import BrownConrady
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.double_sphere import DoubleSphere
 from mpcam.cameras.kannala_brandt import KannalaBrandt
@@ -20,7 +21,16 @@ SCHEMA = 1
 
 MODELS: dict[str, type[Camera]] = {
     model.__name__: model
-    for model in (Pinhole, Orthographic, Radial, KannalaBrandt, DoubleSphere, UnifiedOmni, CameraTriangles)
+    for model in (
+        Pinhole,
+        Orthographic,
+        Radial,
+        KannalaBrandt,
+        DoubleSphere,
+        UnifiedOmni,
+        BrownConrady,
+        CameraTriangles,
+    )
 }
 
 
