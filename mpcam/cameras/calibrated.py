@@ -193,13 +193,17 @@ class Calibrated:
         return Box(vector(*low), vector(*high), inner.valid | outer.valid)
 
     def __repr__(self) -> str:
-        names = ("fx", "fy", "cx", "cy", *self.shape_fields)
-        numbers = ", ".join(f"{name}={_short(getattr(self, name))}" for name in names)
-        if library(self.max_angle) != "numpy" or self.max_angle < PI:
-            numbers += f", max_angle={_short(self.max_angle)}"
-        if library(self.camera_from_world) == "numpy" and not np.array_equal(self.camera_from_world, np.eye(4)):
-            numbers += f", eye={_short(tuple(map(float, self.eye)))}"  # pyright: ignore[reportAttributeAccessIssue]
-        return f"{type(self).__name__}({self.width}, {self.height}, {numbers})"
+        return described(self, ("fx", "fy", "cx", "cy", *self.shape_fields), PI)
+
+
+def described(camera: Any, names: tuple[str, ...], widest: float) -> str:
+    """A camera on one line: size, the fields that are named, max_angle where it is below the widest, and the eye."""
+    numbers = ", ".join(f"{name}={_short(getattr(camera, name))}" for name in names)
+    if library(camera.max_angle) != "numpy" or camera.max_angle < widest:
+        numbers += f", max_angle={_short(camera.max_angle)}"
+    if library(camera.camera_from_world) == "numpy" and not np.array_equal(camera.camera_from_world, np.eye(4)):
+        numbers += f", eye={_short(tuple(map(float, camera.eye)))}"
+    return f"{type(camera).__name__}({camera.width}, {camera.height}, {numbers})"
 
 
 def _short(value: Any) -> str:

@@ -5,15 +5,12 @@ import functools
 import math
 from typing import Annotated, Any
 
-import numpy as np
-
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import Calibrated
 from mpcam.cameras.fields import Number, Positive
 from mpcam.errors import InputError
-from mpcam.math import PI, Array, detach, invert_increasing, library, minimum, polynomial, sign_changes
+from mpcam.math import PI, Array, detach, first_true, invert_increasing, library, polynomial, sign_changes
 
-_NODES = 4096
 _LARGEST = 1e6  # of a coefficient; views have less than 1
 
 
@@ -79,7 +76,8 @@ class KannalaBrandt(Calibrated, Camera):
         """The first angle at which f' vanishes; pi if there is none before."""
         kind = library(*self.k)
         if kind == "jax":
-            return _turn_on_grid(_derivative(tuple(detach(k) for k in self.k)))
+            derivative = _derivative(tuple(detach(k) for k in self.k))
+            return first_true(lambda theta: polynomial(derivative, theta * theta) <= 0, PI)
         numbers = tuple(float(k if kind == "numpy" else detach(k)[0]) for k in self.k)
         return _turn(numbers)
 
@@ -106,17 +104,3 @@ def _derivative(k: tuple[Array, ...]) -> tuple[Array, ...]:
 def _turn(k: tuple[float, ...]) -> float:
     squares = sign_changes(_derivative(k), 0.0, PI * PI)
     return squares[0] ** 0.5 if squares else PI
-
-
-def _turn_on_grid(derivative: tuple[Array, ...]) -> Array:
-    """The same for JAX, on ever finer grids; at most 2e-14 smaller."""
-    import jax.numpy as jnp
-
-    grid = np.arange(1, _NODES + 1) / _NODES
-    start, width = 0.0, PI
-    for _ in range(4):
-        theta = start + width * grid
-        falls = polynomial(derivative, theta * theta) <= 0
-        start = start + width * jnp.where(falls.any(), jnp.argmax(falls), _NODES) / _NODES
-        width = minimum(width / _NODES, PI - start)
-    return start

@@ -3,10 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from mpcam.math.arrays import Array, absolute, detach, epsilon, library, where
+import numpy as np
+
+from mpcam.math.arrays import Array, absolute, detach, epsilon, library, minimum, where
 
 STEPS = 40
 """Steps that bisection alone needs to about 12 digits; Newton's need fewer."""
+
+_NODES = 4096
 
 
 def invert_increasing(
@@ -117,3 +121,19 @@ def sign_changes(coefficients: Sequence[float], low: float, high: float) -> list
                 start = middle
         found.append(start)
     return found
+
+
+def first_true(condition: Callable[[Array], Array], high: Array) -> Array:
+    """Where a condition on a JAX array first holds in (0, high], on ever finer grids; high if it never does.
+
+    At most 1e-10 high smaller. Stretches shorter than 1 / 4096 of high may pass unseen.
+    """
+    import jax.numpy as jnp
+
+    grid = np.arange(1, _NODES + 1) / _NODES
+    start, width = 0.0, high
+    for _ in range(3):
+        holds = condition(start + width * grid)
+        start = start + width * jnp.where(holds.any(), jnp.argmax(holds), _NODES) / _NODES
+        width = minimum(width / _NODES, high - start)
+    return start

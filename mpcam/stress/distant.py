@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.pose import look_at
+from mpcam.math.pose import look_at
 from mpcam.stress.report import Case, StressRow
 
 DISTANCES = (100.0, 300.0, 1000.0)

@@ -59,7 +59,8 @@ def _missed(camera: Any, corners: np.ndarray, bounds: dict[str, BoundOf]) -> dic
     """How many triangles have a sampled point, along the edges or inside, that a bound leaves out."""
     import drjit as dr
 
-    from mpcam.rendering.device_camera import opaque_zero, types, unposed
+    from mpcam.backend import opaque_zero, types
+    from mpcam.rendering.device_camera import unposed
 
     t, lens = types(), unposed(camera)
     # In Dr.Jit's own memory: kernels are compiled anew for NumPy's, by how it happens to be aligned.

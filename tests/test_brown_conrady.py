@@ -1,0 +1,537 @@
+"""The Brown-Conrady lens: against its formula at 50 digits, COLMAP and OpenCV, and what one-to-one means."""
+
+import copy
+import dataclasses
+import pickle
+
+import cv2
+import drjit as dr
+import drjit.llvm as types
+import drjit.llvm.ad as ad
+import jax
+import mitsuba as mi
+import mpmath
+import numpy as np
+import pycolmap
+import pytest
+from catalogue import POSE
+from mpcam.truth.meshes import mitsuba_mesh
+
+import mpcam as mp
+from mpcam.cameras import folds
+from mpcam.cameras.change import resized
+from mpcam.cameras.distortion import Distortion
+from mpcam.cameras.serialize import camera_from_json, camera_to_json
+from mpcam.rendering.device import device_lens
+
+EUROC = (-0.28340811, 0.07395907), (0.00019359, 1.76187114e-05)
+
+LENSES = {
+    "EuRoC": mp.BrownConrady(752, 480, 458.654, 457.296, 367.215, 248.375, *EUROC),
+    "barrel": mp.BrownConrady(64, 64, 60, 61, 32, 31, (-0.28, 0.02), (3e-4, -1e-3)),
+    "simple radial": mp.BrownConrady(640, 480, 520.0, 520.0, 320.0, 240.0, (0.11,)),
+    "rational": mp.BrownConrady(640, 480, 180, 178, 321, 239, (9.1, 5.2, 0.19, 9.4, 8.1, 1.1), (1e-4, -2e-4)),
+    "pole": mp.BrownConrady(64, 64, 15, 15, 32, 32, (0.1, 0.02, 0, -0.4, 0.01, 0), (0.01, 0.02)),
+    "decentred": mp.BrownConrady(64, 64, 40, 41, 32, 31, (-0.2, 0.03), (0.04, -0.07)),
+    "only tangential": mp.BrownConrady(64, 64, 40, 41, 32, 31, (), (0.1, 0.15)),
+    "folds in the image": mp.BrownConrady(64, 64, 40, 41, 32, 31, (-0.5, 0.02), (-0.01, 0.02)),
+    "folds on one side": mp.BrownConrady(64, 64, 15, 15, 32, 31, (-0.3, 0.04, 0.001), (0.004, -0.002)),
+    "stretches": mp.BrownConrady(64, 64, 12, 12, 32, 31, (0.9, 0.7, 0.3), (0.02, 0.01)),
+    "telephoto": mp.BrownConrady(64, 64, 4e5, 4e5, 32, 31, (-0.3, 900.0), (1e-3, 0)),
+}
+
+
+@pytest.fixture(params=LENSES)
+def lens(request):
+    return LENSES[request.param]
+
+
+def published(camera, x, y, z):
+    """Pixel by OpenCV's formula, in the arithmetic of mpmath; x, y, z: a point in the camera frame."""
+    k1, k2, k3, k4, k5, k6 = (mpmath.mpf(value) for value in camera.k)
+    p1, p2 = (mpmath.mpf(value) for value in camera.p)
+    a, b = x / z, y / z
+    r2 = a * a + b * b
+    radial = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
+    u = a * radial + 2 * p1 * a * b + p2 * (r2 + 2 * a * a)
+    v = b * radial + p1 * (r2 + 2 * b * b) + 2 * p2 * a * b
+    return camera.cx + camera.fx * u, camera.cy + camera.fy * v
+
+
+def exact(point):
+    return [mpmath.mpf(float(c)) for c in point]
+
+
+def plane_points(camera, count, seed, most=1.2):
+    """Points (N, 3) on the plane z = 1, up to `most` times the outer radius, and near it, and near the axis."""
+    rng = np.random.default_rng(seed)
+    outer = camera.reach.outer
+    r = outer * rng.uniform(0, most, count)
+    r = np.where(rng.uniform(size=count) < 0.3, outer * (1 - 10.0 ** rng.uniform(-9, 0, count)), r)
+    r = np.where(rng.uniform(size=count) < 0.3, 10.0 ** rng.uniform(-8, np.log10(outer), count), r)
+    phi = rng.uniform(-np.pi, np.pi, count)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), np.ones(count)], -1)
+
+
+def random_lens(rng, wild):
+    """Coefficients as calibrations give them, or of any size."""
+    if not wild:
+        k = rng.normal(size=6) * [0.3, 0.1, 0.03, *(rng.choice([0, 1]) * np.array([0.3, 0.1, 0.03]))]
+        p = rng.normal(size=2) * 2e-3
+    else:
+        k, p = rng.normal(size=6) * 10.0 ** rng.uniform(-3, 1.5, 6), rng.normal(size=2) * 10.0 ** rng.uniform(-4, 0)
+    f = 10.0 ** rng.uniform(1, 4)
+    return mp.BrownConrady(640, 480, f, f * rng.uniform(0.9, 1.1), 320 + 9 * rng.normal(), 240, k, p)
+
+
+def stretch(camera, points):
+    """Largest derivative of the pixel with respect to the direction, by differences: what makes errors larger."""
+    step = 1e-7
+    moved = [points * (1 + step * np.eye(3)[i]) for i in range(2)]
+    here = camera.project(points).pixel[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = [np.abs(camera.project(p).pixel[:, 0] - here).max(-1) / (step * np.abs(points[:, i]))
+                for i, p in enumerate(moved)]  # fmt: skip
+    return np.nan_to_num(np.maximum(*rate)) * (points**2).sum(-1) + camera.fx
+
+
+def test_rays_satisfy_the_formula(lens):
+    """Every pixel's ray, put into the formula at 50 digits, gives the pixel back."""
+    mpmath.mp.dps = 50
+    pixels = np.random.default_rng(1).uniform(0, 1, (40, 2)) * [lens.width, lens.height]
+    ray = lens.ray(pixels)
+    assert ray.valid.mean() > 0.25
+    amplified = stretch(lens, ray.direction)
+    for pixel, direction, factor in zip(pixels[ray.valid], ray.direction[ray.valid], amplified[ray.valid], strict=True):
+        u, v = published(lens, *exact(direction))
+        assert max(abs(u - pixel[0]), abs(v - pixel[1])) < 2e-15 * (factor + 1000)
+
+
+def test_projection_satisfies_the_formula(lens):
+    mpmath.mp.dps = 50
+    points = 3 * plane_points(lens, 40, 2, 1.0)
+    image = lens.project(points)
+    assert image.valid.mean() > 0.3
+    points, pixels = points[image.valid[:, 0]], image.pixel[image.valid]
+    for point, pixel, factor in zip(points, pixels, stretch(lens, points / points[:, 2:]), strict=True):
+        u, v = published(lens, *exact(point))
+        assert np.hypot(float(u - pixel[0]), float(v - pixel[1])) < 4e-15 * (factor + np.hypot(float(u), float(v)))
+
+
+def eigenvalues(camera, x, y):
+    """Of the derivative of the formula at 50 digits, by differences there; ascending."""
+    unit = dataclasses.replace(camera, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
+    h = mpmath.mpf(10) ** -20
+    image = lambda a, b: published(unit, a, b, mpmath.mpf(1))  # noqa: E731
+    du = [(a - b) / (2 * h) for a, b in zip(image(x + h, y), image(x - h, y), strict=True)]
+    dv = [(a - b) / (2 * h) for a, b in zip(image(x, y + h), image(x, y - h), strict=True)]
+    assert abs(du[1] - dv[0]) < 1e-15 * (1 + abs(du[1])), "the map is a gradient: its derivative is symmetric"
+    mean, half = (du[0] + dv[1]) / 2, mpmath.sqrt(((du[0] - dv[1]) / 2) ** 2 + du[1] * dv[0])
+    return mean - half, mean + half
+
+
+@pytest.mark.parametrize("name", ["barrel", "folds in the image"])
+def test_the_domain_ends_where_the_map_folds(name):
+    """To 1e-12: towards (p2, p1) at `outer`, on the other side at `inner`, and in between wherever the fold is."""
+    mpmath.mp.dps = 50
+    camera = LENSES[name]
+    p1, p2 = camera.p
+    toward = np.array([p2, p1]) / np.hypot(p1, p2)
+    assert camera.reach.inner < camera.reach.outer < 1000
+    for radius, sign in ((camera.reach.outer, 1), (camera.reach.inner, -1)):
+        lowest = [eigenvalues(camera, *exact(sign * radius * (1 + away) * toward))[0] for away in (-1e-12, 1e-12)]
+        assert lowest[0] > 0 > lowest[1]
+    for phi in np.linspace(0, 2 * np.pi, 9):
+        azimuth = np.array([np.cos(phi), np.sin(phi)])
+        low, high = 0.0, 2.0 * camera.reach.outer
+        while high - low > 1e-13 * high:
+            middle = 0.5 * (low + high)
+            inside = camera.project([*(middle * azimuth), 1.0]).valid[0]
+            low, high = (middle, high) if inside else (low, middle)
+        lowest = [eigenvalues(camera, *exact(low * (1 + away) * azimuth))[0] for away in (-1e-12, 1e-12)]
+        assert lowest[0] > 0 > lowest[1]
+    assert camera.domain.max_angle == np.arctan(camera.reach.outer)
+    assert camera.inner_angle == np.arctan(camera.reach.inner)
+
+
+def unfolded(camera, points):
+    """Whether the derivative stays positive from the axis to points on z = 1, by many samples of its determinant.
+
+    Not beyond half of the largest image.
+    """
+    share = np.linspace(0, 1, 801)[1:, None, None]
+    x, y = np.moveaxis(share * points[:, :2], -1, 0)
+    (p1, p2), (k1, k2, k3, k4, k5, k6), s = camera.p, camera.k, x * x + y * y
+    above, below = 1 + s * (k1 + s * (k2 + s * k3)), 1 + s * (k4 + s * (k5 + s * k6))
+    with np.errstate(all="ignore"):
+        rate = ((k1 + s * (2 * k2 + 3 * s * k3)) * below - above * (k4 + s * (2 * k5 + 3 * s * k6))) / below**2
+        xx = above / below + 2 * rate * x * x + 2 * p1 * y + 6 * p2 * x
+        yy = above / below + 2 * rate * y * y + 6 * p1 * y + 2 * p2 * x
+        xy = 2 * rate * x * y + 2 * p1 * x + 2 * p2 * y
+        small = np.sqrt(s) * above / below + 3 * s * np.hypot(p1, p2) < 5e5
+        return ((xx * yy > xy * xy) & (xx > 0) & (below > 0) & small & (s < 9e4**2)).all(0)
+
+
+def test_the_domain_is_where_the_map_is_one_to_one():
+    """Nothing valid is behind a fold, and nothing before one is left out, but for shadows of islands of folds."""
+    rng = np.random.default_rng(3)
+    folded = behind = islands = 0
+    for number in range(80):
+        camera = random_lens(rng, number % 2)
+        points = plane_points(camera, 100, number, 2.0)
+        valid, free = camera.project(points).valid[:, 0], unfolded(camera, points)
+        ends = camera.domain.image_radius is not None
+        behind += (valid & ~free).sum() if ends else 0
+        folded += (~valid & ~free).sum() if ends else 0
+        if camera.reach.level > -1e6:
+            islands += 1
+        else:
+            assert valid[free].all(), camera
+    assert behind == 0
+    assert folded > 1200
+    assert islands < 8
+
+
+def round_trip(camera, seed):
+    """(points tried, answers missed, wrong answers) of pixels of points all over the domain and outside."""
+    points = plane_points(camera, 100, seed)
+    image = camera.project(points)
+    valid = image.valid[:, 0]
+    points, pixels = points[valid], image.pixel[valid, 0]
+    ray = camera.ray(pixels)
+    direction = points / np.linalg.norm(points, axis=-1, keepdims=True)
+    apart = np.abs(ray.direction - direction).max(-1)
+    again = camera.project(ray.direction)
+    off = np.abs(again.pixel[:, 0] - pixels).max(-1)
+    allowed = 1e-9 * np.abs(pixels).max(-1) + 1e-15 * stretch(camera, points)
+    # Within sqrt(eps) of a fold, rounding decides where a point is; its pixel is right all the same.
+    wrong = (off > allowed) & again.valid[:, 0] | (apart > 1e-6)
+    return len(points), int((~ray.valid).sum()), int((wrong & ray.valid).sum())
+
+
+def check_round_trips(count, seed):
+    rng = np.random.default_rng(seed)
+    total = np.zeros(3, int)
+    for number in range(count):
+        total += round_trip(random_lens(rng, number % 2), number)
+    assert total[0] > 60 * count
+    assert total[1] == total[2] == 0
+
+
+def test_round_trip_of_random_lenses():
+    check_round_trips(150, 4)
+
+
+@pytest.mark.slow
+def test_round_trip_of_ten_thousand_lenses():
+    check_round_trips(10000, 5)
+
+
+def check_against_others(count, seed):
+    """OpenCV's 8 coefficients, and COLMAP's FULL_OPENCV, OPENCV, RADIAL and SIMPLE_RADIAL, in turn."""
+    rng = np.random.default_rng(seed)
+    zero = np.zeros(3)
+    for number in range(count):
+        camera = random_lens(rng, number % 2)
+        kind = number % 4
+        kept = camera.k if kind < 1 else (camera.k[:2] if kind < 3 else camera.k[:1])
+        f = camera.fx if kind > 1 else camera.fy
+        camera = dataclasses.replace(camera, fy=f, k=kept, p=camera.p if kind < 2 else ())
+        (k1, k2, k3, *rest), (p1, p2) = camera.k, camera.p
+        points = plane_points(camera, 20, number, 1.0)
+        image = camera.project(points)
+        valid = image.valid[:, 0]
+        points, pixels = points[valid], image.pixel[valid, 0]
+        frame = [camera.fx, camera.fy, camera.cx, camera.cy]
+        model, params = (
+            ("FULL_OPENCV", [*frame, k1, k2, p1, p2, k3, *rest]),
+            ("OPENCV", [*frame, k1, k2, p1, p2]),
+            ("RADIAL", [f, *frame[2:], k1, k2]),
+            ("SIMPLE_RADIAL", [f, *frame[2:], k1]),
+        )[kind]
+        theirs = pycolmap.Camera(model=model, width=640, height=480, params=params)
+        matrix = np.array([[camera.fx, 0, camera.cx - 0.5], [0, camera.fy, camera.cy - 0.5], [0, 0, 1]])
+        coefficients = np.array([k1, k2, p1, p2, k3, *rest])
+        opencv = cv2.projectPoints(points[:, None], zero, zero, matrix, coefficients)[0][:, 0] + 0.5
+        for other in (theirs.img_from_cam(points), opencv):
+            assert (np.abs(other - pixels) < 1e-9 * (camera.fx + np.abs(pixels))).all(), camera
+
+
+def test_colmap_and_opencv_project_alike():
+    check_against_others(200, 6)
+
+
+@pytest.mark.slow
+def test_colmap_and_opencv_project_ten_thousand_lenses_alike():
+    check_against_others(10000, 7)
+
+
+def test_opencv_undistorts_alike_where_it_converges_and_is_wrong_elsewhere():
+    """Its undistortPoints says nothing where it fails; once this fails, it has been mended."""
+    rng = np.random.default_rng(8)
+    tried = failed = 0
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-14)
+    for number in range(100):
+        camera = random_lens(rng, 0)
+        points = plane_points(camera, 30, number, 1.0)
+        points = points[np.hypot(*points[:, :2].T) < 10]
+        image = camera.project(points)
+        points, pixels = points[image.valid[:, 0]], image.pixel[image.valid]
+        (k1, k2, k3, *rest), (p1, p2) = camera.k, camera.p
+        matrix = np.array([[camera.fx, 0, camera.cx - 0.5], [0, camera.fy, camera.cy - 0.5], [0, 0, 1]])
+        coefficients = np.array([k1, k2, p1, p2, k3, *rest])
+        theirs = cv2.undistortPoints(pixels[:, None] - 0.5, matrix, coefficients, criteria=criteria)
+        ray = camera.ray(pixels)
+        assert ray.valid.all()
+        ours = ray.direction[:, :2] / ray.direction[:, 2:]
+        scale = 1e-6 * (1 + np.abs(points[:, :2]).max(-1))
+        assert (np.abs(ours - points[:, :2]).max(-1) < scale).all()
+        tried += len(points)
+        failed += (np.abs(theirs[:, 0] - points[:, :2]).max(-1) > scale).sum()
+    assert 0.1 < failed / tried < 0.5
+
+
+def test_without_distortion_it_is_the_pinhole():
+    pixels = np.random.default_rng(9).uniform(-500, 900, (300, 2))
+    ours, pinhole = mp.BrownConrady(64, 48, 30, 31, 30, 23, (), (), POSE), mp.Pinhole(64, 48, 30, 31, 30, 23, POSE)
+    assert np.abs(ours.ray(pixels).direction - pinhole.ray(pixels).direction).max() < 1e-15
+    points = np.random.default_rng(10).normal(size=(300, 3))
+    assert np.array_equal(ours.project(points).valid, pinhole.project(points).valid)
+    seen = ours.project(points).valid
+    assert np.allclose(ours.project(points).pixel[seen], pinhole.project(points).pixel[seen], rtol=1e-13)
+
+
+def test_max_angle_ends_the_domain():
+    camera = mp.BrownConrady(64, 64, 40, 40, 32, 32, (0.1,), (0.01, 0.02), max_angle=0.5)
+    assert camera.domain.max_angle == camera.inner_angle == 0.5
+    for theta, expected in ((0.4999, True), (0.5, True), (0.5001, False)):
+        point = [np.sin(theta), 0, np.cos(theta)]
+        assert camera.project(point).valid[0] == expected
+        free = dataclasses.replace(camera, max_angle=np.pi / 2)
+        assert camera.ray(free.project(point).pixel[0]).valid == expected
+    # The largest radius of the image is that towards (p2, p1).
+    rim = np.tan(0.5) * np.array([0.02, 0.01]) / np.hypot(0.02, 0.01)
+    assert np.isclose(camera.domain.image_radius, np.hypot(*(camera.project([*rim, 1]).pixel[0] - 32)))
+    assert LENSES["stretches"].domain.image_radius is None
+
+
+def test_what_is_beyond_is_invalid():
+    for camera in LENSES.values():
+        image = camera.project(
+            [[0, 0, -1], [1, 2, -3], [1, 0, 0], [0, 0, 0], [np.nan, 0, 1], [np.inf, 1, 1], [1e300, 0, 1]]
+        )
+        assert not image.valid.any()
+        assert np.isfinite(image.pixel).all()
+        ray = camera.ray([[np.nan, 3], [3, -np.inf], [1e300, -1e300], [1e30, 0]])
+        assert not ray.valid.any()
+        assert np.isfinite(ray.direction).all()
+    assert LENSES["EuRoC"].ray(camera.project([1e-200, 0, 1e-200]).pixel[0]).valid
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-8, 1e8, 1e12])
+def test_projection_does_not_depend_on_distance(lens, scale):
+    points = np.array([[0.3, -0.2, 0.9], [1e-6, 0, 1.0], [0.0, 0.0, 1.0]]) * [0.01, 0.01, 1]
+    near = lens.project(points)
+    assert near.valid.all()
+    assert np.allclose(lens.project(points * scale).pixel, near.pixel, rtol=1e-12)
+    far = lens.project(types.Array3f(*(points * scale).T.astype(np.float32)))
+    assert np.allclose(far.pixel[0].numpy().T, near.pixel[:, 0], rtol=2e-6, atol=1e-3)
+
+
+@jax.jit
+def traced_ray(numbers, pixels):
+    """With parameters that JAX traces; the domain is found on grids."""
+    return mp.BrownConrady(64, 64, *numbers[:4], numbers[4:10], numbers[10:]).ray(pixels)
+
+
+def numbers_of(camera):
+    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.k, *camera.p])
+
+
+def test_float32_and_jax_agree_with_float64(lens):
+    pixels = np.random.default_rng(11).uniform(0, 1, (2000, 2)) * [lens.width, lens.height]
+    ray = lens.ray(pixels)
+    on_device = device_lens(lens)
+    device = on_device.local_ray(types.Array2f(*pixels.T.astype(np.float32)))
+    with jax.enable_x64(True):
+        traced = traced_ray(numbers_of(lens), pixels)
+    for other in (device.valid, traced.valid):
+        assert (np.asarray(other) != ray.valid).mean() < 2e-3
+    # Away from folds, where sqrt(eps) of the pixel is eps of the ray.
+    sure = ray.valid & (np.hypot(*ray.direction[:, :2].T) < 0.9 * lens.reach.inner * ray.direction[:, 2])
+    assert sure.mean() > 0.2
+    assert np.abs(device.direction.numpy().T - ray.direction)[sure].max() < 2e-5
+    assert np.abs(np.asarray(traced.direction) - ray.direction)[sure].max() < 1e-13
+    points = 3 * ray.direction[sure]
+    image = on_device.local_project(types.Array3f(*points.T.astype(np.float32)))[0]
+    off = np.abs(image.pixel.numpy().T - lens.project(points).pixel[:, 0]).max(-1)
+    assert (off < 1e-6 * (stretch(lens, points / points[:, 2:]) + 100)).all()
+
+
+def test_double_precision_on_dr_jit():
+    camera = LENSES["EuRoC"]
+    pixels = np.random.default_rng(12).uniform(0, 1, (500, 2)) * [camera.width, camera.height]
+    device = camera.ray(types.Array2f64(*pixels.T))
+    assert np.abs(device.direction.numpy().T - camera.ray(pixels).direction).max() < 1e-14
+
+
+def test_jax_finds_the_same_domain():
+    find = jax.jit(lambda n: folds.reach(Distortion(tuple(n[:6]), (n[7], n[6])), 1.5))
+    for camera in LENSES.values():
+        with jax.enable_x64(True):
+            found = np.asarray(find(numbers_of(camera)[4:]))
+        expected = dataclasses.replace(camera, max_angle=1.5).reach
+        assert np.allclose(found[:2], expected[:2], rtol=1e-6)
+        assert np.isclose(found[2], expected[2], atol=1e-9)
+
+
+def test_two_folds_close_together_are_found():
+    """Radial and of the form (1 - s)^2 - 1e-12: it falls below zero on a stretch of 1e-6 only, which no grid sees."""
+    k = (np.array([1, -2 - 0, 1]) - [1e-12, 0, 0])[1:] / [3, 5]
+    camera = mp.BrownConrady(64, 64, 40, 40, 32, 32, k / (1 - 1e-12))
+    assert abs(camera.reach.outer - 1) < 1e-5
+    open_again = mp.BrownConrady(64, 64, 40, 40, 32, 32, k / (1 + 1e-12) + [0, 1e-11])
+    assert open_again.reach.outer > 2
+
+
+def outputs(numbers, pose, point, pixel):
+    """Pixel of a point and direction of a pixel, as functions of everything."""
+    camera = mp.BrownConrady(64, 64, *numbers[:4], numbers[4:10], numbers[10:], pose)
+    return camera.project(point).pixel[0], camera.ray(pixel).direction
+
+
+gradients = jax.jit(jax.jacrev(outputs, (0, 1, 2, 3)))
+
+
+@pytest.mark.parametrize("name", ["EuRoC", "rational", "decentred", "folds in the image"])
+def test_jax_gradients_match_differences(name):
+    """Of pixels and rays, with respect to points, pixels, the pose and every number of the camera."""
+    camera = LENSES[name]
+    numbers = numbers_of(camera)
+    for off in ([0.2, -0.1], [0.0, 0.0]):
+        pixel = numbers[2:4] + off * numbers[:2]
+        ray = camera.with_pose(POSE).ray(pixel)
+        given = [numbers, POSE, ray.origin + 2.5 * ray.direction, pixel]
+        with jax.enable_x64(True):
+            found = gradients(*given)
+        for of in range(2):
+            for place in (0, 2, 3):
+                for i, value in enumerate(given[place]):
+                    step = 1e-6 * max(1.0, abs(value))
+                    moved = [[*given], [*given]]
+                    for side, sign in enumerate((1, -1)):
+                        moved[side][place] = given[place] + sign * step * np.eye(len(given[place]))[i]
+                    difference = (outputs(*moved[0])[of] - outputs(*moved[1])[of]) / (2 * step)
+                    gradient = np.asarray(found[of][place])[..., i]
+                    assert np.abs(gradient - difference).max() < 1e-6 * (1 + np.abs(difference).max())
+            assert np.isfinite(np.asarray(found[of][1])).all()
+        assert np.abs(np.asarray(found[0][1])).max() > 1
+
+
+def test_gradients_are_finite_everywhere():
+    numbers = numbers_of(LENSES["folds in the image"])
+    pixels = [[32.0, 31], [5, 5], [np.nan, 1], [1e300, 0], [60, 31], [32, 31], [1, 1]]
+    points = [[0, 0, 1.0], [0, 0, 0], [0, 0, -1], [1, 2, -3], [1e300, 0, 1], [9, 9, 1], [1, 0, 0]]
+    for point, pixel in zip(points, pixels, strict=True):
+        with jax.enable_x64(True):
+            found = gradients(numbers, np.eye(4), np.array(point, float), np.array(pixel, float))
+        assert all(np.isfinite(np.asarray(leaf)).all() for leaf in jax.tree_util.tree_leaves(found))
+
+
+def test_dr_jit_gradients_match_differences():
+    camera = LENSES["EuRoC"]
+    pixel = ad.Array2f64([500.0, 200.0], [100.0, 300.0])
+    dr.enable_grad(pixel)
+    direction = camera.ray(pixel).direction
+    dr.backward(dr.sum(direction.x) + 2 * dr.sum(direction.y))
+    at, gradient = np.array([[500.0, 100.0], [200.0, 300.0]]), []
+    for axis in range(2):
+        step = 1e-5 * np.eye(2)[axis]
+        change = (camera.ray(at + step).direction - camera.ray(at - step).direction) / 2e-5
+        gradient.append(change @ [1, 2, 0])
+    assert np.allclose(dr.grad(pixel).numpy(), gradient, rtol=1e-6)
+
+
+def test_kernels_see_every_number():
+    camera = LENSES["folds in the image"]
+    on_device = device_lens(camera)
+    for name in ("k", "p", "reach"):
+        numbers = [number.numpy()[0] for number in getattr(on_device, name)]
+        assert np.allclose(numbers, getattr(camera, name), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", mp.BrownConrady.examples(8, 8))
+def test_linear_views_and_fine_meshes_come_near(name):
+    """On a finely divided sphere, straight edges and a cubemap are nearly right."""
+    camera = mp.BrownConrady.examples(128, 96, mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7)))[name]
+    mesh = mp.builtin_mesh("sphere", triangles=20480)
+    truth = mp.rasterize(camera, mesh, method="raytrace")
+    assert truth.mask.mean() > 0.8
+    for method, settings, tolerance in (("vertex", {"level": 2}, 1e-4), ("cubemap", {"resolution": 512}, 2e-3)):
+        hits = mp.rasterize(camera, mesh, method=method, **settings)
+        assert (hits.mask != truth.mask).mean() < 2e-3
+        both = hits.mask & truth.mask
+        assert np.percentile(np.abs(hits.depth[both] - truth.depth[both]), 99) < tolerance
+
+
+@pytest.mark.parametrize("name", mp.BrownConrady.examples(8, 8))
+def test_mitsuba_traces_the_rays_of_the_camera(name):
+    mi.set_variant("llvm_ad_rgb")
+    mp.truth.register()
+    camera = mp.BrownConrady.examples(96, 72, mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7)))[name]
+    mesh = mp.builtin_mesh("temple")
+    shape = mitsuba_mesh(mi, "mesh", mesh.vertices, mesh.faces)
+    sensor = mp.truth.sensor(camera, 1, centred=True)
+    scene = mi.load_dict({"type": "scene", "integrator": {"type": "depth"}, "mesh": shape, "sensor": sensor})
+    image = np.array(mi.render(scene, spp=1))[..., 0]
+    hits = mp.rasterize(camera, mesh, method="raytrace")
+    assert ((image > 0) != hits.mask).sum() <= 1
+    both = (image > 0) & hits.mask
+    assert (np.abs(image[both] - hits.depth[both]) <= 1e-4 * np.maximum(hits.depth[both], 1)).mean() >= 0.999
+
+
+def test_files_and_copies_are_equal(lens, tmp_path):
+    camera = lens.with_pose(POSE)
+    assert camera_from_json(camera_to_json(camera)) == camera
+    mp.write_image(tmp_path / "a.exr", np.zeros((camera.height, camera.width, 3), np.float32), camera=camera)
+    assert mp.read_camera(tmp_path / "a.exr") == camera
+    for again in (pickle.loads(pickle.dumps(camera)), copy.deepcopy(camera)):
+        assert again == camera
+        assert again.reach == camera.reach
+    leaves, tree = jax.tree_util.tree_flatten(camera)
+    assert len(leaves) == 4 + 6 + 2 + 1 + 1
+    assert jax.tree_util.tree_unflatten(tree, leaves) == camera
+
+
+def test_another_size_shows_the_same():
+    camera = LENSES["EuRoC"]
+    half = resized(camera, 376, 240)
+    pixels = np.array([[100.0, 200.0], [700.0, 30.0]])
+    assert np.allclose(camera.ray(pixels).direction, half.ray(pixels / 2).direction, atol=1e-12)
+
+
+def test_printed_on_one_line():
+    text = repr(mp.BrownConrady(64, 48, 30, 31, 32, 24, (-0.3, 0.1), (1e-3,), mp.look_at((1, 2, 3), (0, 0, 0)), 1.0))
+    assert text == (
+        "BrownConrady(64, 48, fx=30, fy=31, cx=32, cy=24, k=(-0.3, 0.1, 0, 0, 0, 0), p=(0.001, 0), "
+        "max_angle=1, eye=(1, 2, 3))"
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, 0.1), r"k=0.1\): at most 6 numbers are needed"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, [0.0] * 7), "at most 6 numbers"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (), (1, 2, 3)), r"p=\(1, 2, 3\)\): at most 2 numbers"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (np.nan,)), "between -1e.06 and 1e.06"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, "none"), "at most 6 numbers"),
+        (lambda: mp.BrownConrady(4, 4, 0, 3, 2, 2), "fx=0.*above 0"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, max_angle=2), "above 0 and at most pi / 2"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2).bound(np.zeros((3, 3))), "local_bound.*BrownConrady does not have"),
+    ],
+)
+def test_mistakes_are_one_line(make, words):
+    with pytest.raises(mp.InputError, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
