@@ -19,7 +19,7 @@ from mpcam.comparison.columns import COLUMNS
 from mpcam.geometry.builtin import builtin_mesh
 from mpcam.io import scene_tables as tables
 from mpcam.io.camera_tables import CameraTable, camera_table
-from mpcam.rendering import cubemap, invert, methods, vertex
+from mpcam.rendering import cubemap, registry, vertex
 from mpcam_kernels.backend import NAMES, VARIABLE
 
 ROOT = Path(__file__).parents[1]
@@ -224,10 +224,10 @@ def test_built_in_scenes_are_named(page):
 
 def test_every_method_and_setting_is_described():
     page = text_of("methods")
-    for method in methods.METHODS:
+    for method in registry.METHODS:
         assert f"\n| `{method}` | " in page
         assert re.search(rf"^## .*`{method}`", page, re.MULTILINE)
-    assert all(f'"{bound}"' in page for bound in invert.BOUNDS)
+    assert all(f'"{bound}"' in page for bound in (*registry.OUTLINE_BOUNDS, *registry.RAY_BOUNDS))
     assert f"`level=0` to {vertex.MOST_LEVELS}" in page
     resolution = inspect.signature(cubemap.Cubemapped).parameters["resolution"].default
     assert f"`resolution={resolution}`" in page

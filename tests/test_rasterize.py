@@ -9,8 +9,7 @@ import pytest
 from catalogue import NAMES, cameras, first_hits, soup
 
 import mpcam as mp
-
-METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
+from mpcam.rendering.registry import METHODS
 
 
 def assert_agree(hits, truth, mismatch=2e-4, depth=1e-4, common=0.999):

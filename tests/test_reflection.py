@@ -7,7 +7,8 @@ import pytest
 
 import mpcam as mp
 from mpcam.comparison import metrics
-from mpcam.effects.reflection import METHODS, Reflection
+from mpcam.effects.mirror_methods import MIRROR_METHODS as METHODS
+from mpcam.effects.reflection import Reflection
 
 SIZE = (96, 72)
 

@@ -8,16 +8,15 @@ import numpy as np
 
 from mpcam.comparison import metrics, timing
 from mpcam.comparison.motion import moving_frame
-from mpcam.comparison.plan import LEVELS, PARAMETER, Choice
+from mpcam.comparison.plan import Choice, knob
 from mpcam.comparison.progress import Steps
 from mpcam.comparison.rows import Row
 from mpcam.decomposition.ray_error import ray_error
-from mpcam.effects.reflection import METHODS, Reflection
+from mpcam.effects.mirror_methods import MIRROR_METHODS
+from mpcam.effects.reflection import Reflection
 from mpcam.errors import InputError
 from mpcam.scene.scene import Scene
 
-TRIANGLES = (26, 52, 104, 208, 416, 1664)
-SIZES = (64, 256, 1024)
 FINE = 416
 """Camera triangles in which the vertices of method "vertex" are looked for."""
 
@@ -26,26 +25,20 @@ def mirror_plan(
     methods: Iterable[str] | None, settings: Mapping[str, Sequence[Mapping[str, Any] | float]] | None
 ) -> list[Choice]:
     """Methods and settings for a scene with a mirror; see `mpcam.compare`. Raises InputError for other names."""
-    names = (
-        list(METHODS) if methods is None else list(dict.fromkeys([methods] if isinstance(methods, str) else methods))
-    )
+    given = MIRROR_METHODS if methods is None else [methods] if isinstance(methods, str) else methods
+    names = list(dict.fromkeys(given))
     settings = dict(settings or {})
     for name in (*names, *settings):
-        if name not in METHODS:
-            raise InputError(f"Method {name!r} shows no mirror; the methods: {', '.join(METHODS)}.")
-    defaults: dict[str, Sequence[Any]] = {
-        "camera_triangles": TRIANGLES,
-        "vertex": LEVELS,
-        "environment": SIZES,
-        "raytrace": ({},),
-    }
+        if name not in MIRROR_METHODS:
+            raise InputError(f"Method {name!r} shows no mirror; the methods: {', '.join(MIRROR_METHODS)}.")
     choices = []
     for name in names:
-        for entry in settings.get(name, defaults[name]):
+        for entry in settings.get(name, MIRROR_METHODS[name].values or ({},)):
             if not isinstance(entry, Mapping):
-                if name not in PARAMETER:
+                parameter = knob(name)
+                if parameter is None:
                     raise InputError(f"Setting {entry!r} of {name}: this method has no number to set; give {{}}.")
-                entry = {PARAMETER[name]: entry}
+                entry = {parameter: entry}
             choices.append(Choice(name, dict(entry)))
     return choices
 

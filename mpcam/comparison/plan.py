@@ -4,20 +4,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from mpcam.effects.mirror_methods import MIRROR_METHODS
 from mpcam.errors import InputError
-from mpcam.rendering.methods import METHODS
+from mpcam.rendering.registry import METHODS
 
 MAX_TRIANGLES = 4_000_000
-LEVELS = (0, 1, 2, 3, 4)
-RESOLUTIONS = (64, 128, 256, 512)
-PARAMETER = {
-    "vertex": "level",
-    "cubemap": "resolution",
-    "hemicube": "resolution",
-    "camera_triangles": "triangles",
-    "environment": "size",
-}
-"""The setting that trades time for error, by method; methods without one are compared as they are."""
+
+
+def knob(method: str) -> str | None:
+    """The setting that trades time for error; None for methods that are compared as they are."""
+    entry = METHODS.get(method) or MIRROR_METHODS.get(method)
+    return entry.knob if entry else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +28,14 @@ class Choice:
     @property
     def parameter(self) -> Any:
         """The value of the method's own parameter, or None."""
-        return self.settings.get(PARAMETER.get(self.method, ""))
+        return self.settings.get(knob(self.method) or "")
 
     @property
     def setting(self) -> str:
         """The settings as text: the bare number of the method's own parameter (levels named), others as name=value."""
         parts = []
         for name, value in self.settings.items():
-            if name != PARAMETER.get(self.method):
+            if name != knob(self.method):
                 parts.append(f"{name}={value}")
             else:
                 parts.append(f"level {value}" if name == "level" else f"{value}")
@@ -56,7 +53,7 @@ def make_plan(
 ) -> list[Choice]:
     """Choose methods and settings for a mesh of so many triangles; whether a camera suits them, `prepare` knows.
 
-    methods: names out of `mpcam.rendering.methods.METHODS`; None for all. settings: method -> list of settings, each a
+    methods: names out of `mpcam.rendering.registry.METHODS`; None for all. settings: method -> list of settings, each a
     mapping for `prepare` or the bare number of the method's parameter, e.g. {"vertex": [0, 3], "invert": [{"bound":
     "tight"}]}; methods that it does not name keep theirs. Raises `InputError` for names that do not exist.
     """
@@ -86,18 +83,20 @@ def _named(methods: Iterable[str]) -> Iterable[str]:
 
 
 def _defaults(method: str, triangles: int) -> list[Choice]:
-    if method == "vertex":
-        levels = [level for level in LEVELS if level == 0 or triangles * 4**level <= MAX_TRIANGLES]
-        note = "" if levels == list(LEVELS) else f"higher levels left out: more than {MAX_TRIANGLES:,} triangles"
-        return [Choice(method, {"level": level}, note if level == levels[-1] else "") for level in levels]
-    if method in ("cubemap", "hemicube"):
-        return [Choice(method, {"resolution": resolution}) for resolution in RESOLUTIONS]
-    return [Choice(method)]
+    name, values, note = knob(method), METHODS[method].values, ""
+    if name is None:
+        return [Choice(method)]
+    if name == "level":
+        levels = [level for level in values if level == 0 or triangles * 4**level <= MAX_TRIANGLES]
+        note = "" if levels == list(values) else f"higher levels left out: more than {MAX_TRIANGLES:,} triangles"
+        values = tuple(levels)
+    return [Choice(method, {name: value}, note if value == values[-1] else "") for value in values]
 
 
 def _choice(method: str, entry: Mapping[str, Any] | float) -> Choice:
     if isinstance(entry, Mapping):
         return Choice(method, dict(entry))
-    if method not in PARAMETER:
+    name = knob(method)
+    if name is None:
         raise InputError(f"Setting {entry!r} of {method}: this method has no number to set; give a mapping, or {{}}.")
-    return Choice(method, {PARAMETER[method]: entry})
+    return Choice(method, {name: entry})

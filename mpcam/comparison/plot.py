@@ -9,17 +9,10 @@ import numpy as np
 from mpcam.comparison.columns import COLUMNS
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.rows import Findings
+from mpcam.effects.mirror_methods import MIRROR_METHODS
+from mpcam.rendering.registry import METHODS
 
-# Colours that stay apart for colour-blind readers (after Okabe and Ito), darkened for white paper; shapes tell too.
-STYLES = {
-    "invert": ("#0b62c4", "o"),
-    "vertex": ("#c2560b", "^"),
-    "cubemap": ("#0a7f6b", "s"),
-    "hemicube": ("#8a3fb0", "D"),
-    "raytrace": ("#3c4043", "X"),
-    "camera_triangles": ("#0b62c4", "v"),
-    "environment": ("#8a3fb0", "D"),
-}
+STYLES = {name: entry.style for name, entry in (MIRROR_METHODS | METHODS).items()}
 OTHER = ("#8a6d00", "P")
 
 

@@ -15,6 +15,7 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
 from mpcam.effects.lookup import check_size
+from mpcam.effects.mirror_methods import MIRROR_METHODS
 from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, MirrorPart, explained
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
@@ -25,15 +26,6 @@ from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import check_shading, check_shadows, shade_device
 from mpcam.scene.mirror import Mirror
 from mpcam.scene.scene import Scene
-
-SETTINGS: dict[str, tuple[str, ...]] = {
-    "camera_triangles": ("triangles", "resolution", "cams"),
-    "vertex": ("triangles", "level", "cams"),
-    "environment": ("size",),
-    "raytrace": (),
-}
-"""The methods, and what may be set of each."""
-METHODS = tuple(SETTINGS)
 
 
 class Reflection:
@@ -77,12 +69,13 @@ class Reflection:
         check_shading(shading)
         check_shadows(shadows, scene, shading)
         self.camera, self.mirror = given, found
-        if method not in METHODS:
-            raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
+        if method not in MIRROR_METHODS:
+            raise InputError(f"method={method!r}: allowed are {', '.join(MIRROR_METHODS)}")
+        names = {one: entry.home(given).names for one, entry in MIRROR_METHODS.items()}
         given_settings = {"triangles": triangles, "resolution": resolution, "cams": cams, "size": size, "level": level}
         for name, value in given_settings.items():
-            if value is not None and name not in SETTINGS[method]:
-                fitting = " or ".join(repr(one) for one in METHODS if name in SETTINGS[one])
+            if value is not None and name not in names[method]:
+                fitting = " or ".join(repr(one) for one in names if name in names[one])
                 raise InputError(f"{name}= goes with method={fitting}, not with {method!r}")
         self.direct = prepare(given, scene.mesh)
         self.part = self._part(triangles, resolution, size, level, cams)

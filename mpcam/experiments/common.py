@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.comparison.facts import machine_facts
 from mpcam.comparison.metrics import SAME_DEPTH, hit_errors
-from mpcam.rendering.invert import BOUNDS
+from mpcam.rendering.registry import OUTLINE_BOUNDS as BOUNDS
 
 WARMUP = 2
 PAPER = "Gascuel, Holzschuch, Fournier, Péroche: Fast Non-Linear Projections using Graphics Hardware, I3D 2008"

@@ -10,7 +10,6 @@ from mpcam.comparison.metrics import flip_map, image_rmse, psnr
 from mpcam.comparison.mirrors import FINE
 from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.pareto import pareto_front
-from mpcam.comparison.plan import LEVELS as HALVINGS
 from mpcam.comparison.progress import Progress, Steps
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.ray_error import ray_error
@@ -28,6 +27,7 @@ from mpcam.experiments.hou2006_fig6_pages import (
 )
 from mpcam.experiments.hou2006_scenes import SHAPES, reflection_scene, smaller
 from mpcam.experiments.results import Report
+from mpcam.rendering.registry import METHODS
 from mpcam.scene.scene import Scene
 
 ROUNDS = 7
@@ -49,7 +49,8 @@ def _levels(quick: bool) -> tuple[tuple[int, int], ...]:
 
 
 def _halvings(quick: bool) -> tuple[int, ...]:
-    return HALVINGS[:3:2] if quick else HALVINGS
+    levels = METHODS["vertex"].values
+    return levels[:3:2] if quick else levels
 
 
 def run(repeats: int | None = None, quick: bool = False, progress: Progress | None = None) -> Report:

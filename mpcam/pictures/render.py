@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
-from mpcam.effects.reflection import SETTINGS, Reflection
+from mpcam.effects.mirror_methods import MIRROR_METHODS
+from mpcam.effects.reflection import Reflection
 from mpcam.effects.shadows import shadow_maps
 from mpcam.errors import InputError
 from mpcam.pictures.explain import explain as explained
@@ -56,7 +57,7 @@ def _mirrored(
     names = {"invert": "camera_triangles"} | {name: name for name in ("vertex", "environment", "raytrace")}
     if method not in names:
         raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
-    allowed = [name for name in SETTINGS[names[method]] if name != "cams"]
+    allowed = [name for name in MIRROR_METHODS[names[method]].home(camera).names if name != "cams"]
     for name in settings:
         if name not in allowed:
             raise InputError(

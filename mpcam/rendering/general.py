@@ -21,10 +21,8 @@ from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
 from mpcam.rendering.ray_blocks import DeviceRays
+from mpcam.rendering.registry import CULLING, CULLS, RAY_BOUNDS
 
-BOUNDS = ("tight", "triangle", "nine_point")
-CULLS = ("none", "back", "front")
-CULLING = ("objects", "triangles")
 MOST_PAIRS = 1 << 32
 
 
@@ -52,8 +50,8 @@ class GeneralRasterizer:
     ):
         if cull not in CULLS:
             raise InputError(f"cull={cull!r}: allowed are {', '.join(CULLS)}")
-        if bound not in BOUNDS:
-            raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
+        if bound not in RAY_BOUNDS:
+            raise InputError(f"bound={bound!r}: allowed are {', '.join(RAY_BOUNDS)}")
         if isinstance(culling, str) or not set(culling) <= set(CULLING):
             raise InputError(f"culling={culling!r}: give some or none of {', '.join(CULLING)}, as a tuple")
         self.mesh, self.output, self.bound, self.cull = mesh, output, bound, cull

@@ -11,9 +11,8 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.buffered import Buffered
 from mpcam.rendering.device import to_camera
 from mpcam.rendering.outlines import ROWS
+from mpcam.rendering.registry import CULLS, OUTLINE_BOUNDS
 
-BOUNDS = ("tight", "triangle", "quad")
-CULLS = ("none", "back", "front")
 ANEW = "prepare anew, by mpcam.prepare"
 
 
@@ -31,8 +30,8 @@ class Inverted(Buffered):
     method = "invert"
 
     def __init__(self, camera: Camera, mesh: Mesh, bound: str = "tight", output: str = "hits", cull: str = "none"):
-        if bound not in BOUNDS:
-            raise InputError(f"bound={bound!r}: allowed are {', '.join(BOUNDS)}")
+        if bound not in OUTLINE_BOUNDS:
+            raise InputError(f"bound={bound!r}: allowed are {', '.join(OUTLINE_BOUNDS)}")
         if cull not in CULLS:
             raise InputError(f"cull={cull!r}: allowed are {', '.join(CULLS)}")
         self.bound, self.output, self.cull = bound, output, cull

@@ -1,19 +1,20 @@
 """The methods by name: `prepare` for many frames, and `rasterize`, `depth_map` and `coverage_map` for one."""
 
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, Unpack, overload
 
 import numpy as np
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.capabilities import Images, Outlines
+from mpcam.cameras.capabilities import HasRays, need
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.maps import OUTPUTS, CoverageMap, DepthMap
+from mpcam.rendering.registry import METHODS, CubemapSettings, InvertSettings, VertexSettings
 from mpcam.scene.scene import Scene
 
-METHODS = ("invert", "vertex", "cubemap", "hemicube", "raytrace")
+Output = Literal["hits", "depth", "coverage"]
 
 
 class Prepared(Protocol):
@@ -40,78 +41,105 @@ class Prepared(Protocol):
         ...
 
 
+@overload
+def prepare(
+    camera: Camera,
+    mesh: Mesh | Scene,
+    method: Literal["invert"] = "invert",
+    *,
+    output: Output = "hits",
+    **settings: Unpack[InvertSettings],
+) -> Prepared: ...
+
+
+@overload
+def prepare(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["vertex"], **settings: Unpack[VertexSettings]
+) -> Prepared: ...
+
+
+@overload
+def prepare(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["cubemap", "hemicube"], **settings: Unpack[CubemapSettings]
+) -> Prepared: ...
+
+
+@overload
+def prepare(
+    camera: Camera, mesh: Mesh | Scene, method: str = "invert", *, output: str = "hits", **settings: Any
+) -> Prepared: ...
+
+
 def prepare(
     camera: Camera, mesh: Mesh | Scene, method: str = "invert", *, output: str = "hits", **settings: Any
 ) -> Prepared:
     """A camera, a mesh and a method, ready to give frames: uploads, trees and tessellations are made here.
 
     output: what frames hold: "hits", or with method "invert" less and faster: "depth" (a DepthMap) or "coverage" (a
-    CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad") and `cull` ("none", "back" or "front":
-    the side of triangles that is not shown; corners run counter-clockwise in front); `level` (0 to 7) for vertex;
-    `resolution` (pixels per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown methods
-    and settings, and where a method cannot serve the camera.
+    CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad"; for cameras that give nothing but rays
+    "tight", and for camera triangles "triangle" or "nine_point"), `cull` ("none", "back" or "front": the side of
+    triangles that is not shown; corners run counter-clockwise in front), and where there is nothing but rays `culling`
+    (see `GeneralRasterizer`); `level` (0 to 7) for vertex; `resolution` (pixels per face) for cubemap and hemicube;
+    none for raytrace. Raises InputError for unknown methods and settings, and where a camera lacks what a method needs.
     """
     if not isinstance(camera, Camera):
         raise InputError(
             f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid"
         )
+    need(camera, HasRays, "a frame")
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
-    invert = ("bound", "cull") if _outlined(camera) else ("bound", "cull", "culling")
-    kinds = {"invert": invert, "vertex": ("level",), "cubemap": ("resolution",), "hemicube": ("resolution",)}
     if method not in METHODS:
         raise InputError(f"method={method!r}: allowed are {', '.join(METHODS)}")
-    allowed = kinds.get(method, ())
-    if "bound" not in allowed and settings.get("bound") == "tight":  # the default is nothing to complain of
+    entry = METHODS[method]
+    home = entry.home(camera)
+    if "bound" not in home.names and settings.get("bound") == "tight":  # the default is nothing to complain of
         settings = {name: value for name, value in settings.items() if name != "bound"}
     for name in settings:
-        if name not in allowed:
-            raise InputError(f"method={method!r} has no setting {name!r}: allowed are {', '.join(allowed) or 'none'}")
+        if name not in home.names:
+            allowed = ", ".join(home.names) or "none"
+            raise InputError(f"method={method!r} has no setting {name!r}: allowed are {allowed}")
     if output not in OUTPUTS:
         raise InputError(f"output={output!r}: allowed are {', '.join(OUTPUTS)}")
-    if method == "invert":
-        settings = {**settings, "output": output}
-    elif output != "hits":
+    if output not in entry.outputs:
         raise InputError(f"method={method!r} gives output='hits' only: use method='invert' for output={output!r}")
-    return _kind(method, camera)(camera, mesh, **settings)
+    if len(entry.outputs) > 1:
+        settings = {**settings, "output": output}
+    return home.load()(camera, mesh, **settings)
 
 
-def _outlined(camera: Camera) -> bool:
-    """Whether images of triangles are outlined from their corners, which is faster than from the pixels' rays."""
-    capability = {"central": Outlines, "parallel": Images, "general": None}[camera.ray_geometry]
-    return capability is not None and isinstance(camera, capability)
+@overload
+def rasterize(
+    camera: Camera,
+    mesh: Mesh | Scene,
+    method: Literal["invert"] = "invert",
+    **settings: Unpack[InvertSettings],
+) -> Hits: ...
 
 
-def _kind(method: str, camera: Camera) -> Any:
-    """The class of a method for a camera; each is imported only when it is asked for."""
-    if method == "invert" and not _outlined(camera):
-        from mpcam.rendering.general import GeneralRasterizer
+@overload
+def rasterize(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["vertex"], **settings: Unpack[VertexSettings]
+) -> Hits: ...
 
-        return GeneralRasterizer
-    if method == "invert":
-        from mpcam.rendering.invert import Inverted
 
-        return Inverted
-    if method == "vertex":
-        from mpcam.rendering.vertex import VertexProjected
+@overload
+def rasterize(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["cubemap", "hemicube"], **settings: Unpack[CubemapSettings]
+) -> Hits: ...
 
-        return VertexProjected
-    if method == "raytrace":
-        from mpcam.rendering.raytrace import RayTraced
 
-        return RayTraced
-    from mpcam.rendering.cubemap import Cubemapped, Hemicubed
-
-    return Cubemapped if method == "cubemap" else Hemicubed
+@overload
+def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Hits: ...
 
 
 def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **settings: Any) -> Hits:
     """First hits of every pixel's ray on a mesh.
 
-    camera: any of mpcam's cameras. mesh: a Mesh, or a Scene (its meshes as one). method: "invert" (exact: bounds each
-    curved triangle and inverts per pixel), "vertex" (projected vertices, straight edges), "cubemap", "hemicube"
-    (resampled linear views), "raytrace" (Mitsuba). settings: see `prepare`. Returns Hits with triangle (H, W),
-    barycentric (H, W, 2), depth (H, W); fields that are not asked for cost nothing. Raises InputError.
+    camera: any of mpcam's cameras, or one of your own. mesh: a Mesh, or a Scene (its meshes as one). method: "invert"
+    (exact: bounds each curved triangle and inverts per pixel), "vertex" (projected vertices, straight edges),
+    "cubemap", "hemicube" (resampled linear views), "raytrace" (Mitsuba). settings: see `prepare`. Returns Hits with
+    triangle (H, W), barycentric (H, W, 2), depth (H, W); fields that are not asked for cost nothing. Raises InputError.
     """
     return prepare(camera, mesh, method, **settings).frame()
 

@@ -11,7 +11,8 @@ import numpy as np
 from mpcam.backend import types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.general import BOUNDS, GeneralRasterizer
+from mpcam.rendering.general import GeneralRasterizer
+from mpcam.rendering.registry import RAY_BOUNDS as BOUNDS
 from mpcam.stress.report import StressRow
 
 SIDE, FACES, TRIANGLES = 20, 10, 2000
