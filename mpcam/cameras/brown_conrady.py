@@ -113,7 +113,10 @@ class BrownConrady(Camera):
         x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
         valid = valid & (maximum(absolute(x), absolute(y)) < 2.0 * FARTHEST)
         x, y = where(valid, x, 0.0), where(valid, y, 0.0)
-        x, y, found = self.distortion.undistorted(self._reach(), x, y)
+        doubt = epsilon(x) * maximum(
+            (absolute(u) + absolute(self.cx)) / self.fx, (absolute(v) + absolute(self.cy)) / self.fy
+        )
+        x, y, found = self.distortion.undistorted(self._reach(), x, y, where(valid, doubt, 0.0))
         valid = valid & found
         zero = 0.0 * x
         x, y = where(valid, x, 0.0), where(valid, y, 0.0)

@@ -105,13 +105,14 @@ class Distortion(NamedTuple):
         near = r <= outer * (1.0 + 4.0 * epsilon(r))
         return near & self.unfolded(s, along, across) & ((r < inner) | (along > level * r))
 
-    def undistorted(self, reach: Reach, u: Array, v: Array) -> tuple[Array, Array, Array]:
+    def undistorted(self, reach: Reach, u: Array, v: Array, doubt: Array) -> tuple[Array, Array, Array]:
         """The point whose image is (u, v), and whether there is one where the map is one to one.
 
-        The derivative is that of the implicit-function theorem: one Newton step of the map of the plane.
+        doubt: how far off (u, v) may be by rounding; images so little beyond a fold count as on it. The derivative is
+        that of the implicit-function theorem: one Newton step of the map of the plane.
         """
         still = self.still()
-        x, y, valid = still._solved(reach, detach(u), detach(v))
+        x, y, valid = still._solved(reach, detach(u), detach(v), detach(doubt))
         s = x * x + y * y
         value, slope, _ = still.ratio(s)
         common = value + 2.0 * still.turned(x, y)[0]
@@ -127,7 +128,7 @@ class Distortion(NamedTuple):
         # Only their derivatives: near a fold the steps themselves are rounding noise.
         return x - (step_x - detach(step_x)), y - (step_y - detach(step_y)), valid
 
-    def _solved(self, reach: Reach, u: Array, v: Array) -> tuple[Array, Array, Array]:
+    def _solved(self, reach: Reach, u: Array, v: Array, doubt: Array) -> tuple[Array, Array, Array]:
         """The root in r between 0 and where the point along m leaves the reach.
 
         There the function has one root at most, where it rises. Along the way q.m / |m| only falls, and the reach only
@@ -177,7 +178,7 @@ class Distortion(NamedTuple):
         sizes = [polynomial([absolute(c) for c in part], s) for part in self.parts()]
         rounding = (sizes[0] + sizes[1] * absolute(self.ratio(s)[0])) / polynomial(self.parts()[1], s)
         scale = length + r * (rounding + absolute(rise)) + 3.0 * s * (absolute(self.q[0]) + absolute(self.q[1]))
-        return r * x, r * y, absolute(function) <= _ROUNDING * epsilon(r) * scale
+        return r * x, r * y, absolute(function) <= doubt + _ROUNDING * epsilon(r) * scale
 
 
 def _jet(coefficients: tuple[Array, ...], s: Array) -> tuple[Array, Array, Array]:
