@@ -70,7 +70,7 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
     x, y, z = point
     largest = maximum(maximum(abs(x), abs(y)), abs(z))
     scale = 1.0 / where(largest > 0, largest, 1.0)
-    x, y, z = x * scale, y * scale, z * scale
+    x, y, z = x * scale, y * scale, where(largest > 0, z * scale, 1.0)
     squared = x * x + y * y
     off_axis = squared > smallest(squared)
     rho = sqrt(where(off_axis, squared, 1.0))
@@ -84,11 +84,11 @@ def symmetric_image(profile: Profile, point: Vector) -> tuple[Array, Array, Arra
 
 
 def radius_of(profile: Profile, theta: Array, rho: Array, z: Array) -> Array:
-    """Radius of a direction at theta = atan2(rho, z), or of the profile's reach."""
-    reach = minimum(theta, profile.reach)
+    """Radius of a direction at theta = atan2(rho, z), or of the profile's reach beyond that."""
+    reach = profile.reach
     if profile.toward is None:
-        return profile.radius(reach)
-    inside, length = within(theta, profile.reach), sqrt(rho * rho + z * z)
+        return profile.radius(minimum(theta, reach))
+    inside, length = within(theta, reach), sqrt(rho * rho + z * z)
     return profile.toward(where(inside, rho / length, sin(reach)), where(inside, z / length, cos(reach)))
 
 

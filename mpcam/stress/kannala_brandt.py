@@ -65,7 +65,7 @@ def definition(camera: KannalaBrandt) -> Definition:
         most = min(mpmath.mpf(camera.max_angle), mpmath.pi)
         if not slopes:
             return most
-        roots = mpmath.polyroots([*reversed(slopes), mpmath.mpf(1)], maxsteps=500, extraprec=500)
+        roots = mpmath.polyroots([mpmath.mpf(1), *slopes], maxsteps=500, extraprec=500, asc=True)
         return min([most, *(mpmath.sqrt(r.real) for r in roots if abs(r.imag) < 1e-40 * abs(r) and r.real > 0)])
 
     return Definition(radius, largest, parameters(*camera.k))

@@ -57,8 +57,8 @@ def images(camera: Any, points: np.ndarray, precision: str) -> tuple[np.ndarray,
         with np.errstate(all="ignore"):
             image = camera.local_project(points.T)[0]
         return image.pixel.T, image.depth, image.valid
-    lens, types = _on_device(camera)
-    return _numbers(lens.local_project(types.Array3f(*points.T.astype(np.float32)))[0], len(points))
+    lens, given = _on_device(camera, points)
+    return _numbers(lens.local_project(given)[0], len(points))
 
 
 def rays(camera: Any, pixels: np.ndarray, precision: str) -> tuple[np.ndarray, ...]:
@@ -67,16 +67,19 @@ def rays(camera: Any, pixels: np.ndarray, precision: str) -> tuple[np.ndarray, .
         with np.errstate(all="ignore"):
             ray = camera.local_ray(pixels.T)
         return ray.origin.T, ray.direction.T, ray.valid
-    lens, types = _on_device(camera)
-    return _numbers(lens.local_ray(types.Array2f(*pixels.T.astype(np.float32))), len(pixels))
+    lens, given = _on_device(camera, pixels)
+    return _numbers(lens.local_ray(given), len(pixels))
 
 
-def _on_device(camera: Any) -> tuple[Any, Any]:
-    """The camera as kernels have it, and their types."""
-    from mpcam.backend import types
+def _on_device(camera: Any, given: np.ndarray) -> tuple[Any, Any]:
+    """The camera as kernels have it, and rows as vectors of theirs."""
+    from mpcam.backend import opaque_zero, types
     from mpcam.rendering.device_camera import unposed
 
-    return (camera if camera.ray_geometry == "general" else unposed(camera)), types()
+    lens = camera if camera.ray_geometry == "general" else unposed(camera)
+    kind = getattr(types(), f"Array{given.shape[1]}f")
+    # In Dr.Jit's own memory: kernels are compiled anew for NumPy's, by how it happens to be aligned.
+    return lens, kind(*np.ascontiguousarray(given.T, np.float32)) + opaque_zero()
 
 
 def _numbers(found: Any, count: int) -> tuple[np.ndarray, ...]:

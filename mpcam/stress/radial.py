@@ -51,7 +51,7 @@ def definition(camera: Radial) -> Definition:
     return Definition(radius, lambda fov: fov / 2, parameters(camera.fov))
 
 
-def _bounds(camera: Radial) -> dict[str, BoundOf]:
+def bounds(camera: Radial) -> dict[str, BoundOf]:
     """The bounds of every camera, and the paper's."""
     return known_bounds(camera) | {"bounding triangles": _pieces, "box of quads": _quads}
 
@@ -74,5 +74,5 @@ def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = N
     check_counts(triangles=triangles, points=points)
     cases = []
     for name, camera in cameras().items():
-        cases += lens_cases(name, camera, definition(camera), points, triangles, _bounds(camera))
+        cases += lens_cases(name, camera, definition(camera), points, triangles, bounds(camera))
     return run_cases([*cases, *distant_cases(narrow_view)], progress)

@@ -63,7 +63,7 @@ def _missed(camera: Any, corners: np.ndarray, bounds: dict[str, BoundOf]) -> dic
     from mpcam.rendering.device_camera import unposed
 
     t, lens = types(), unposed(camera)
-    # In Dr.Jit's own memory: kernels are compiled anew for NumPy's, by how it happens to be aligned.
+    # In Dr.Jit's own memory, so that the kernel is compiled once.
     single = [t.Array3f(*np.ascontiguousarray(corners[:, i].T)) + opaque_zero() for i in range(3)]
     size = max(camera.width, camera.height)
     regions = {kind: [_Region(t, region, size) for region in bound(lens, *single)] for kind, bound in bounds.items()}
