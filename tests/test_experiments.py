@@ -20,7 +20,7 @@ from mpcam.experiments import gascuel2008_table3 as table3
 from mpcam.experiments import gascuel2008_table3_pages as table3_pages
 from mpcam.experiments.output import write
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Report, Table
-from mpcam.rendering.invert import BOUNDS
+from mpcam.rendering.registry import OUTLINE_BOUNDS as BOUNDS
 
 ROOT = Path(__file__).parents[1]
 HOSTILE = """a <b>"name"</b> & </script><img src=x onerror="window.broken=1"> {{PARTS}} $1$"""

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import mpcam as mp
+from mpcam.backend import types
 from mpcam.cameras.calibrated import FARTHEST
-from mpcam.rendering.device import device_lens, types
+from mpcam.rendering.device_camera import unposed
 from mpcam.stress import suite
 from mpcam.stress.exact import DIGITS
 
@@ -75,7 +76,7 @@ def test_kernels_see_as_much(front):
     """float32 cannot hold xi, but what the image depends on."""
     camera = double_sphere(front, 0.6)
     pixels = np.random.default_rng(1).uniform(0, 64, (2, 100)).astype(np.float32)
-    lens: Any = device_lens(camera)
+    lens: Any = unposed(camera)
     ray = lens.local_ray(types().Array2f(*pixels))
     exact = camera.local_ray(pixels.astype(np.float64))
     assert (ray.valid.numpy() == exact.valid).all()
