@@ -8,7 +8,7 @@ import numpy as np
 import pycolmap
 import pytest
 import yaml
-from calibration_examples import CAMCHAIN, DOUBLE, FISHEYE, MEI, PINHOLE, UNIFIED
+from calibration_examples import BROWN, CAMCHAIN, DOUBLE, FISHEYE, MEI, PINHOLE, RATIONAL, SIMPLE, SIXTH, UNIFIED
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_dict
@@ -18,10 +18,10 @@ from mpcam.io.cameras import load_camera
 POSE = mp.look_at((0.3, -0.2, 0.1), (0.5, 1.0, 0.7))
 OTHER = mp.look_at((1.3, 0.2, 0.1), (0.5, 1.0, 0.7))
 HELD = {
-    "colmap": [PINHOLE, FISHEYE, UNIFIED, MEI],
-    "opencv": [PINHOLE, FISHEYE, MEI],
-    "kalibr": [PINHOLE, FISHEYE, DOUBLE, UNIFIED, MEI],
-    "nerfstudio": [PINHOLE, FISHEYE],
+    "colmap": [PINHOLE, FISHEYE, UNIFIED, MEI, BROWN, SIXTH, RATIONAL, SIMPLE],
+    "opencv": [PINHOLE, FISHEYE, MEI, BROWN, SIXTH, RATIONAL],
+    "kalibr": [PINHOLE, FISHEYE, DOUBLE, UNIFIED, MEI, BROWN],
+    "nerfstudio": [PINHOLE, FISHEYE, BROWN, SIXTH],
 }
 SUFFIX = {"colmap": "txt", "opencv": "yml", "kalibr": "yaml", "nerfstudio": "json"}
 NAMES = {"colmap": ["1", "7"], "opencv": ["left"], "kalibr": ["cam0", "cam1"], "nerfstudio": ["a/1.png", "a/2.png"]}
@@ -70,7 +70,7 @@ def test_models_that_a_format_cannot_hold(tmp_path, style, camera):
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("camera", [FISHEYE, PINHOLE, UNIFIED])
+@pytest.mark.parametrize("camera", [FISHEYE, PINHOLE, UNIFIED, BROWN, SIXTH, RATIONAL, SIMPLE])
 def test_colmap_reads_what_is_written_and_the_other_way(tmp_path, camera):
     mp.write_calibration(tmp_path / "cameras.txt", {"3": camera})
     line = (tmp_path / "cameras.txt").read_text().splitlines()[-1].split()
@@ -87,6 +87,10 @@ def test_colmap_reads_what_is_written_and_the_other_way(tmp_path, camera):
         ("SIMPLE_PINHOLE", [300, 321, 239]),
         ("SIMPLE_RADIAL", [300, 321, 239, 0]),
         ("OPENCV", [300, 301, 321, 239, 0, 0, 0, 0]),
+        ("SIMPLE_RADIAL", [300, 321, 239, -0.1]),
+        ("RADIAL", [300, 321, 239, -0.1, 0.02]),
+        ("OPENCV", [300, 301, 321, 239, -0.1, 0.02, 0.003, -0.002]),
+        ("FULL_OPENCV", [300, 301, 321, 239, -0.1, 0.02, 0.003, -0.002, 0.01, 0.04, 0.03, 0.02]),
         ("SIMPLE_FISHEYE", [300, 321, 239]),
         ("FISHEYE", [300, 301, 321, 239]),
         ("SIMPLE_RADIAL_FISHEYE", [300, 321, 239, 0.02]),
@@ -106,7 +110,7 @@ def test_colmap_models(tmp_path, model, parameters):
     assert np.abs(theirs.img_from_cam(points) - ours.project(points).pixel[:, 0]).max() < 1e-9
 
 
-@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE, MEI])
+@pytest.mark.parametrize("camera", [PINHOLE, FISHEYE, MEI, BROWN, RATIONAL])
 def test_opencv_reads_what_is_written(tmp_path, camera):
     path = tmp_path / "camera.yml"
     mp.write_calibration(path, camera, "opencv")

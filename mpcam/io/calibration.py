@@ -20,7 +20,8 @@ def read_calibration(path: str | Path, format: str | None = None) -> dict[str, C
     format: "colmap" (cameras.txt; names are its numbers, there are no poses), "opencv" (YAML of one camera, no pose),
     "kalibr" (camchain YAML; poses relative to cam0) or "nerfstudio" (transforms.json; names are the frames' file
     paths); found out from the content if left out. Pixel centres and axes are converted to those of mpcam: centre of
-    the top left pixel at (0.5, 0.5), x right, y down, z forward.
+    the top left pixel at (0.5, 0.5), x right, y down, z forward. Radial and tangential distortion makes a BrownConrady,
+    and a Pinhole where all coefficients are zero.
 
     Raises InputError for files that cannot be read or understood, for models and distortion that no camera of mpcam
     has, and for poses that are not rigid.
@@ -47,9 +48,11 @@ def write_calibration(path: str | Path, cameras: Camera | Mapping[str, Camera], 
     cameras: by name; names must suit the format ("colmap": whole numbers; "kalibr": cam0, cam1, ...; "nerfstudio": file
     paths of the images; "opencv": one camera only). A single camera gets a name that does. format: see
     `read_calibration`; if left out, .txt is COLMAP's and .json nerfstudio's. What these files have no place for is
-    left out: poses (all but Kalibr's relative ones and nerfstudio's) and `max_angle`.
+    left out: poses (all but Kalibr's relative ones and nerfstudio's) and `max_angle`. Kalibr holds k1, k2, p1 and p2 of
+    a BrownConrady, nerfstudio k3 too; COLMAP's file says the smallest of its models that holds the camera.
 
-    Raises InputError for models that the format does not have, for unsuitable names, and where nothing can be written.
+    Raises InputError for models and coefficients that the format does not have, for unsuitable names, and where nothing
+    can be written.
     """
     suffix = Path(path).suffix.lower()
     if format is None and suffix not in _SUFFIXES:

@@ -1,14 +1,20 @@
 """COLMAP's cameras.txt: one line per camera, intrinsics only. Pixel centres are as here."""
 
-from mpcam.cameras import Camera, KannalaBrandt, Pinhole, UnifiedOmni
+from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import Part, as_number, intrinsics, undistorted
+from mpcam.io.calibration_parts import Part, as_number, coefficients, intrinsics, radtan, undistorted
 
 STYLE = "COLMAP's cameras.txt"
-MODELS: dict[type[Camera], str] = {Pinhole: "PINHOLE", KannalaBrandt: "OPENCV_FISHEYE", UnifiedOmni: "EUCM"}
+MODELS: dict[type[Camera], str] = {
+    Pinhole: "PINHOLE",
+    BrownConrady: "FULL_OPENCV",
+    KannalaBrandt: "OPENCV_FISHEYE",
+    UnifiedOmni: "EUCM",
+}
+_RADTAN = ("SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")  # the first that holds a camera is written
 
 # Parameters of each model in the order of the file. f stands for fx and fy; k1 to k4 belong to the angle's polynomial
-# where the model is a fisheye, and are otherwise distortion that must be zero, as all other parameters must.
+# where the model is a fisheye, whose other parameters must be zero.
 _FRAME = "fx fy cx cy"
 _PARAMETERS = {
     "SIMPLE_PINHOLE": "f cx cy",
@@ -68,8 +74,7 @@ def _camera(where: str, model: str, size: list[str], values: list[str]) -> Camer
     if model == "EUCM":
         return part.camera(UnifiedOmni, *frame, given["alpha"], given["beta"])
     if not model.endswith("FISHEYE"):
-        undistorted(part, list(given.values()), f"the distortion of {model}")
-        return part.camera(Pinhole, *frame)
+        return radtan(part, frame[:2], list(frame[2:]), given)
     k = [given.pop(key, 0.0) for key in ("k1", "k2", "k3", "k4")]
     undistorted(part, list(given.values()), f"the distortion {', '.join(given)} of {model}")
     return part.camera(KannalaBrandt, *frame, k)
@@ -85,11 +90,22 @@ def write(cameras: dict[str, Camera]) -> str:
     for name, camera in cameras.items():
         if not (name.isdecimal() and name.isascii()):
             raise InputError(f"camera {name!r}: {STYLE} numbers its cameras: give names like '1', '2'")
-        parameters = [*intrinsics(camera, MODELS, STYLE)]
+        parameters, model = [*intrinsics(camera, MODELS, STYLE)], MODELS[type(camera)]
         if isinstance(camera, KannalaBrandt):
             parameters += camera.k
         elif isinstance(camera, UnifiedOmni):
             parameters += [camera.alpha, camera.beta]
-        words = [name, MODELS[type(camera)], camera.width, camera.height, *(repr(float(p)) for p in parameters)]
+        elif isinstance(camera, BrownConrady):
+            model, parameters = _smallest(camera, *parameters)
+        words = [name, model, camera.width, camera.height, *(repr(float(p)) for p in parameters)]
         lines.append(" ".join(map(str, words)))
     return "\n".join(lines) + "\n"
+
+
+def _smallest(camera: BrownConrady, fx: float, fy: float, cx: float, cy: float) -> tuple[str, list[float]]:
+    """The model with the fewest parameters that holds a camera, and they."""
+    given = coefficients(camera)
+    needed = {name for name, value in given.items() if value} | ({"fx"} if fx != fy else set())
+    model = next(model for model in _RADTAN if needed <= set(_PARAMETERS[model].split()))
+    values = {"f": fx, "fx": fx, "fy": fy, "cx": cx, "cy": cy, **given}
+    return model, [values[name] for name in _PARAMETERS[model].split()]

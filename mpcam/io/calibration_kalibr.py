@@ -7,14 +7,23 @@ import re
 
 import numpy as np
 
-from mpcam.cameras import Camera, DoubleSphere, KannalaBrandt, Pinhole, UnifiedOmni
+from mpcam.cameras import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import HALF, Part, intrinsics, inverse, pinhole_or_fisheye, undistorted
+from mpcam.io.calibration_parts import (
+    HALF,
+    Part,
+    coefficients_held,
+    intrinsics,
+    inverse,
+    pinhole_or_fisheye,
+    undistorted,
+)
 from mpcam.io.calibration_yaml import read_yaml
 
 STYLE = "Kalibr's camchain"
 MODELS: dict[type[Camera], str] = {
     Pinhole: "pinhole",
+    BrownConrady: "pinhole",
     KannalaBrandt: "pinhole",
     DoubleSphere: "ds",
     UnifiedOmni: "eucm",
@@ -57,6 +66,9 @@ def _camera(part: Part) -> Camera:
     shape, (fx, fy, cx, cy) = numbers[:-4], numbers[-4:]
     frame = [fx, fy, cx + HALF, cy + HALF]
     if model == "pinhole":
+        if distortion in ("none", "fov"):
+            undistorted(part, coefficients, f"{distortion} distortion of {model}")
+            coefficients = []
         return pinhole_or_fisheye(part, distortion == "equidistant", size, frame, coefficients)
     if distortion == "equidistant":
         raise part.error(f"no camera of mpcam has equidistant distortion on top of {model}")
@@ -79,6 +91,8 @@ def write(cameras: dict[str, Camera]) -> str:
         distortion, coefficients = "none", []
         if isinstance(camera, KannalaBrandt):
             distortion, coefficients = "equidistant", camera.k
+        elif isinstance(camera, BrownConrady):
+            distortion, coefficients = "radtan", coefficients_held(camera, "k1 k2 p1 p2", STYLE)
         elif isinstance(camera, DoubleSphere):
             shape = [camera.xi, camera.alpha]
         elif isinstance(camera, UnifiedOmni):

@@ -9,16 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras import Camera, KannalaBrandt, Pinhole
+from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import Part, intrinsics, inverse, pinhole_or_fisheye
+from mpcam.io.calibration_parts import (
+    Part,
+    coefficients_held,
+    intrinsics,
+    inverse,
+    pinhole_or_fisheye,
+    radtan,
+    undistorted,
+)
 
 STYLE = "nerfstudio's transforms.json"
-MODELS: dict[type[Camera], str] = {Pinhole: "PINHOLE", KannalaBrandt: "OPENCV_FISHEYE"}
+MODELS: dict[type[Camera], str] = {Pinhole: "PINHOLE", BrownConrady: "OPENCV", KannalaBrandt: "OPENCV_FISHEYE"}
 
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # between OpenGL's and OpenCV's camera axes
-_COEFFICIENTS = ("k1", "k2", "k3", "k4")
+_COEFFICIENTS = ("k1", "k2", "k3", "k4")  # without a fisheye, k4 belongs to r^8
+_TANGENTIAL = ("p1", "p2")
 
 
 def recognizes(text: str) -> bool:
@@ -66,17 +75,20 @@ def _camera(part: Part) -> Camera:
     else:
         fx = part.number("fl_x")
     frame = [fx, part.number("fl_y", fx), part.number("cx", 0.5 * width), part.number("cy", 0.5 * height)]
-    coefficients = [part.number(key, 0.0) for key in _COEFFICIENTS]
-    tangential = [part.number(key, 0.0) for key in ("p1", "p2")]
-    if fisheye and any(tangential):
-        raise part.error("p1 and p2 of a fisheye are not zero: no camera of mpcam has tangential distortion")
-    return pinhole_or_fisheye(part, fisheye, (width, height), frame, coefficients + ([] if fisheye else tangential))
+    given = {key: part.number(key, 0.0) for key in (*_COEFFICIENTS, *_TANGENTIAL)}
+    if not fisheye:
+        undistorted(part, [given.pop("k4")], "k4, the distortion of the eighth order")
+        return radtan(part, (width, height), frame, given)
+    if any(given[key] for key in _TANGENTIAL):
+        raise part.error("p1 and p2 of a fisheye are not zero: no fisheye of mpcam has tangential distortion")
+    return pinhole_or_fisheye(part, True, (width, height), frame, [given[key] for key in _COEFFICIENTS])
 
 
 def write(cameras: dict[str, Camera]) -> str:
     """The file's text; intrinsics stand at the top where all cameras share them, else in each frame."""
     models = {type(camera) for camera in cameras.values()}
-    if len(models) > 1:
+    kinds = {MODELS.get(model, "") for model in models}
+    if len(models) > 1 and kinds != {"PINHOLE", "OPENCV"}:
         names = ", ".join(sorted(model.__name__ for model in models))
         raise InputError(f"{STYLE} holds cameras of one model, not {names}: write one file for each")
     lenses = [_lens(camera) for camera in cameras.values()]
@@ -85,7 +97,7 @@ def write(cameras: dict[str, Camera]) -> str:
     for (name, camera), lens in zip(cameras.items(), lenses, strict=True):
         pose = inverse(np.asarray(camera.camera_from_world, np.float64)) @ _FLIP
         frames.append({"file_path": name, **({} if shared else lens), "transform_matrix": pose.tolist()})
-    top = {"camera_model": MODELS[models.pop()], **shared}
+    top = {"camera_model": "OPENCV" if len(kinds) > 1 else kinds.pop(), **shared}
     return json.dumps({**top, "frames": frames}, indent=1, allow_nan=False) + "\n"
 
 
@@ -94,4 +106,7 @@ def _lens(camera: Camera) -> dict[str, Any]:
     lens: dict[str, Any] = {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": camera.width, "h": camera.height}
     if isinstance(camera, KannalaBrandt):
         lens |= dict(zip(_COEFFICIENTS, camera.k, strict=True))
+    elif isinstance(camera, BrownConrady):
+        names = (*_COEFFICIENTS[:3], *_TANGENTIAL)
+        lens |= dict(zip(names, coefficients_held(camera, " ".join(names), STYLE), strict=True))
     return lens

@@ -6,16 +6,30 @@ The names are those of OpenCV's calibration programs and of ROS; the centre of t
 import json
 from typing import Any
 
-from mpcam.cameras import Camera, KannalaBrandt, Pinhole, UnifiedOmni
+from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import HALF, Part, intrinsics, pinhole_or_fisheye, single, undistorted
+from mpcam.io.calibration_parts import (
+    HALF,
+    Part,
+    coefficients_held,
+    intrinsics,
+    pinhole_or_fisheye,
+    single,
+    undistorted,
+)
 from mpcam.io.calibration_yaml import read_yaml
 
 STYLE = "OpenCV's YAML"
-MODELS: dict[type[Camera], str] = {Pinhole: "pinhole", KannalaBrandt: "fisheye", UnifiedOmni: "omnidir"}
+MODELS: dict[type[Camera], str] = {
+    Pinhole: "pinhole",
+    BrownConrady: "pinhole",
+    KannalaBrandt: "fisheye",
+    UnifiedOmni: "omnidir",
+}
 
 _FISHEYE = ("fisheye", "equidistant", "kannala_brandt", "kannalabrandt4")
-_PLAIN = ("plumb_bob", "rational_polynomial", "none", "pinhole")
+_PLAIN = ("plumb_bob", "rational_polynomial", "radtan", "none", "pinhole")
+_COEFFICIENTS = "k1 k2 p1 p2 k3 k4 k5 k6"  # the last three only where they are needed
 
 
 def recognizes(text: str) -> bool:
@@ -85,6 +99,9 @@ def write(cameras: dict[str, Camera]) -> str:
     if isinstance(camera, KannalaBrandt):
         coefficients = list(camera.k)
         lines.append("fisheye_model: 1")
+    elif isinstance(camera, BrownConrady):
+        coefficients = coefficients_held(camera, _COEFFICIENTS, STYLE)
+        coefficients = coefficients if any(coefficients[5:]) else coefficients[:5]
     elif isinstance(camera, UnifiedOmni):
         if camera.beta != 1 or camera.alpha == 1:
             raise InputError(

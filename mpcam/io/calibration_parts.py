@@ -6,13 +6,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mpcam.cameras import Camera, KannalaBrandt, Pinhole
+from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole
 from mpcam.errors import InputError
 
 T = TypeVar("T")
 
 HALF = 0.5
 """What OpenCV and Kalibr, with (0, 0) at the centre of the first pixel, lack in their principal points."""
+
+RADTAN = tuple("k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y".split())
+"""OpenCV's coefficients in its order: radial and tangential, rational, thin prism, tilted sensor."""
 
 
 class Part:
@@ -125,10 +128,36 @@ def undistorted(part: Part, coefficients: list[float], what: str) -> None:
 def pinhole_or_fisheye(
     part: Part, fisheye: bool, size: tuple[int, int], frame: list[float], coefficients: list[float]
 ) -> Camera:
-    """A KannalaBrandt camera, or a pinhole whose distortion must be zero; frame: fx, fy, cx, cy."""
+    """A KannalaBrandt camera, or one with OpenCV's coefficients; frame: fx, fy, cx, cy."""
     if fisheye:
         if len(coefficients) != 4:
             raise part.error(f"a fisheye needs 4 distortion coefficients k1 to k4, not {len(coefficients)}")
         return part.camera(KannalaBrandt, *size, *frame, coefficients)
-    undistorted(part, coefficients, "radial and tangential distortion")
-    return part.camera(Pinhole, *size, *frame)
+    if len(coefficients) not in (0, 4, 5, 8, 12, 14):
+        raise part.error(f"{len(coefficients)} distortion coefficients are there, 0, 4, 5, 8, 12 or 14 are needed")
+    return radtan(part, size, frame, dict(zip(RADTAN, coefficients, strict=False)))
+
+
+def radtan(part: Part, size: tuple[int, int], frame: list[float], given: dict[str, float]) -> Camera:
+    """A camera with radial and tangential distortion, a Pinhole where that is zero; given: coefficients by name."""
+    kinds = (("thin prism distortion", ("s1", "s2", "s3", "s4")), ("a tilted sensor", ("tau_x", "tau_y")))
+    for kind, names in kinds:
+        undistorted(part, [given.get(name, 0.0) for name in names], f"{kind} ({', '.join(names)})")
+    k, p = ([given.get(f"{letter}{i + 1}", 0.0) for i in range(count)] for letter, count in (("k", 6), ("p", 2)))
+    if not any((*k, *p)):
+        return part.camera(Pinhole, *size, *frame)
+    return part.camera(BrownConrady, *size, *frame, k, p)
+
+
+def coefficients(camera: BrownConrady) -> dict[str, float]:
+    """k1 to k6, p1 and p2 by name."""
+    return {f"{letter}{i + 1}": float(value) for letter in "kp" for i, value in enumerate(getattr(camera, letter))}
+
+
+def coefficients_held(camera: BrownConrady, names: str, style: str) -> list[float]:
+    """Those that a format has a place for, in its order; raises InputError where others are not zero."""
+    given = coefficients(camera)
+    lost = [name for name, value in given.items() if value and name not in names.split()]
+    if lost:
+        raise InputError(f"{style} has no place for {', '.join(lost)} of {camera!r}: it holds {names}")
+    return [given[name] for name in names.split()]
