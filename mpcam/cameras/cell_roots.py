@@ -3,16 +3,16 @@
 A ray with origin o and direction d passes through q where p x d = 0 with p = o - q. Over a part of a cell p and d are
 bilinear, so the two components of p x d across the middle direction are biquadratic, and their Bernstein coefficients
 bound them. A part without a root is left out; where the derivative hardly changes there is at most one root, and
-Newton's iteration, kept inside, finds it; any other part is cut in four. What is left of a part of 2**-LEVELS of a cell
-is dropped: there two roots meet, or the point lies where rays of a whole curve or area meet.
+Newton's iteration, kept inside, finds it; any other part is cut in two, across the way along which that changes most.
+What is left after LEVELS cuts is dropped: there two roots meet, or rays of a whole curve or area meet in the point.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-LEVELS = 26
-MOST_PARTS = 256
+LEVELS = 52
+MOST_PARTS = 1024
 """Parts of a cell that wait to be looked at; where it takes more, the point is seen all along a curve."""
 STEPS = 8
 _EPS = 2.0**-52
@@ -28,7 +28,7 @@ class Roots(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """Parts of cells. number: of the pair; low (2, M), size (M,): in the cell; p, d (4, 3, M): at the four corners."""
+    """Parts of cells. number: of the pair; low, size (2, M): in the cell; p, d (4, 3, M): at the four corners."""
 
     number: np.ndarray
     low: np.ndarray
@@ -39,11 +39,13 @@ class _Parts(NamedTuple):
     def __getitem__(self, chosen: np.ndarray) -> "_Parts":  # pyright: ignore[reportIncompatibleMethodOverride]
         return _Parts(*(values[..., chosen] for values in self))
 
-    @property
-    def quarters(self) -> "_Parts":
-        number, size = np.tile(self.number, 4), np.tile(0.5 * self.size, 4)
-        low = np.concatenate([self.low + 0.5 * self.size * np.array([[i], [j]]) for j in (0, 1) for i in (0, 1)], 1)
-        return _Parts(number, low, size, _quarters(self.p), _quarters(self.d))
+    def halves(self, upright: np.ndarray) -> "_Parts":
+        """The left and right halves of parts, or where not upright the upper and lower ones."""
+        cut = np.where(upright, np.array([[0.5], [1.0]]), np.array([[1.0], [0.5]]))
+        size = self.size * cut
+        low = np.concatenate([self.low, self.low + self.size * (1 - cut)], 1)
+        p, d = (_halves(corners, upright) for corners in (self.p, self.d))
+        return _Parts(np.tile(self.number, 2), low, np.tile(size, 2), p, d)
 
 
 def roots(points: np.ndarray, places: np.ndarray, along: np.ndarray) -> Roots:
@@ -55,7 +57,7 @@ def roots(points: np.ndarray, places: np.ndarray, along: np.ndarray) -> Roots:
     count = points.shape[1]
     scale = np.abs(along).max((0, 1))
     d = along / np.where(scale > 0, scale, 1.0)
-    parts = _Parts(np.arange(count), np.zeros((2, count)), np.ones(count), places - points, d)
+    parts = _Parts(np.arange(count), np.zeros((2, count)), np.ones((2, count)), places - points, d)
     far = np.abs(points).max(0)
     found = []
     for _ in range(LEVELS):
@@ -66,9 +68,9 @@ def roots(points: np.ndarray, places: np.ndarray, along: np.ndarray) -> Roots:
         one = alive & system.at_most_one
         if one.any():
             found.append(_newton(parts[one], system.chosen(one)))
-        parts = parts[alive & ~one]
-        waiting = np.bincount(parts.number, minlength=count)
-        parts = parts[waiting[parts.number] <= MOST_PARTS // 4].quarters
+        waiting = np.bincount(parts.number[alive & ~one], minlength=count)
+        kept = alive & ~one & (waiting[parts.number] <= MOST_PARTS // 2)
+        parts = parts[kept].halves(system.chosen(kept).upright(parts.size[:, kept]))
     if not found:
         return Roots(np.zeros(0, np.int64), *np.zeros((3, 0)))
     return Roots(*(np.concatenate(values) for values in zip(*found, strict=True)))
@@ -125,6 +127,26 @@ class _System:
         """What rounding makes of a root, (2, M), as part of the size."""
         return np.abs(self.inverse).sum(1) * self.doubt
 
+    def upright(self, size: np.ndarray) -> np.ndarray:
+        """Whether a part is better cut into a left and a right half. size: (2, M) of the parts.
+
+        Cutting x halves the second derivative in x, and what the mixed one adds to the derivative in y. Where the rays
+        go many ways, that across which they turn most is cut, and where nothing else tells, the longer side.
+        """
+        g = np.einsum("abm,bijm->aijm", self.inverse, self.f)
+        mixed = np.abs(g[:, 1:, 1:] - g[:, :-1, 1:] - g[:, 1:, :-1] + g[:, :-1, :-1]).max((1, 2))
+        by_x = np.abs(g[:, 2] - 2 * g[:, 1] + g[:, 0]).max((0, 1)) + mixed[1]
+        by_y = np.abs(g[:, :, 2] - 2 * g[:, :, 1] + g[:, :, 0]).max((0, 1)) + mixed[0]
+        unit = np.moveaxis(self.d / np.sqrt((self.d * self.d).sum(0)), 1, 0)
+        turn_x, turn_y = (
+            np.max([((unit[i] - unit[j]) ** 2).sum(0) for i, j in sides], axis=0)
+            for sides in (((0, 1), (2, 3)), ((0, 2), (1, 3)))
+        )
+        scattered = ~(self.d[2] > 0).all(0)
+        by_x, by_y = np.where(scattered, turn_x, by_x), np.where(scattered, turn_y, by_y)
+        told = (self.regular | scattered) & (by_x != by_y)
+        return np.where(told, by_x > by_y, size[0] >= size[1])
+
     @property
     def at_most_one(self) -> np.ndarray:
         """Where the derivative, times its inverse in the middle, is near to one throughout, and rays go one way.
@@ -157,7 +179,7 @@ def _newton(parts: _Parts, system: _System) -> Roots:
     error = (2 * system.rounding + 8 * _EPS).max(0)
     kept = np.abs(step).max(0) <= error  # else the root lies outside
     place = (parts.low + parts.size * (place + step))[:, kept]
-    return Roots(parts.number[kept], place[0], place[1], (error * parts.size)[kept] + 4 * _EPS)
+    return Roots(parts.number[kept], place[0], place[1], (error * parts.size.max(0))[kept] + 4 * _EPS)
 
 
 def _one_sign(values: np.ndarray, doubt: np.ndarray) -> np.ndarray:
@@ -175,8 +197,8 @@ def _bilinear(corners: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.nd
     x, y = place
     upper, lower = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 2]
     left, right = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    value = (1 - y) * (corners[:, 0] + x * upper) + y * (corners[:, 2] + x * lower)
-    return value, (1 - y) * upper + y * lower, (1 - x) * left + x * right
+    above, below = ((1 - x) * corners[:, k] + x * corners[:, k + 1] for k in (0, 2))
+    return (1 - y) * above + y * below, (1 - y) * upper + y * lower, (1 - x) * left + x * right
 
 
 def _coefficients(p: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -198,12 +220,10 @@ def _frame(axis: np.ndarray) -> np.ndarray:
     return np.stack([[1 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y], [x, y, z]])
 
 
-def _quarters(corners: np.ndarray) -> np.ndarray:
-    """Corners of the four quarters, one quarter after the other, from those of the whole (4, 3, M)."""
-    grid = {(i, j): corners[(2 * j + i) // 2] for i in (0, 2) for j in (0, 2)}
-    for j in (0, 2):
-        grid[1, j] = 0.5 * (grid[0, j] + grid[2, j])
-    for i in (0, 1, 2):
-        grid[i, 1] = 0.5 * (grid[i, 0] + grid[i, 2])
-    parts = [np.stack([grid[i, j], grid[i + 1, j], grid[i, j + 1], grid[i + 1, j + 1]]) for j in (0, 1) for i in (0, 1)]
-    return np.concatenate(parts, -1)
+def _halves(corners: np.ndarray, upright: np.ndarray) -> np.ndarray:
+    """Corners of the first halves and then of the second ones, from those of the whole (4, 3, M); see `halves`."""
+    a, b, c, d = corners
+    middle = 0.5 * (a + np.where(upright, b, c)), 0.5 * (np.where(upright, c, b) + d)
+    first = np.stack([a, np.where(upright, middle[0], b), np.where(upright, c, middle[0]), middle[1]])
+    second = np.stack([middle[0], np.where(upright, b, middle[1]), np.where(upright, middle[1], c), d])
+    return np.concatenate([first, second], -1)

@@ -1,6 +1,7 @@
 """Which cells of a ray map may see a point: bounds of blocks of cells, from the whole map down to each cell. NumPy.
 
-A cell lies between the centers of four pixels; at the border of the image it reaches on to the border.
+A cell lies between the centers of four pixels; along the border of the image, halves of pixels are cells of their own,
+where the rays of the nearest cell go on.
 """
 
 from collections.abc import Iterator
@@ -50,16 +51,21 @@ class Bounds(NamedTuple):
 class CellTree:
     """The cells of a map and the bounds of 1, 2 x 2, 4 x 4, ... of them.
 
-    origins, directions: (H, W, 3), finite; the direction is zero where a pixel has no ray. A cell counts if all four
-    pixels have one. x (W,), y (H,): borders of the cells, pixels from the center of the first one; places,
-    along (3, H, W): origins and directions there.
+    origins, directions: (H, W, 3), finite; the direction is zero where a pixel has no ray. exists (H + 1, W + 1): cells
+    with rays, those between four pixels that have one and their continuations; there is no cell in a map of one row or
+    column. x (W + 2,), y (H + 2,): borders of the cells, pixels; places, along (3, H + 2, W + 2): origins and
+    directions there.
     """
 
     def __init__(self, origins: np.ndarray, directions: np.ndarray):
         height, width = origins.shape[:2]
-        self.x, self.y = _borders(width), _borders(height)
-        exists = (directions != 0).any(-1)
-        self.exists = exists[:-1, :-1] & exists[1:, :-1] & exists[:-1, 1:] & exists[1:, 1:]
+        if min(height, width) < 2:
+            self.exists = np.zeros((0, 0), bool)
+            return
+        self.x, self.y = (np.array([0.0, *(np.arange(count) + 0.5), count]) for count in (width, height))
+        pixels = (directions != 0).any(-1)
+        between = pixels[:-1, :-1] & pixels[1:, :-1] & pixels[:-1, 1:] & pixels[1:, 1:]
+        self.exists = np.pad(between, 1, mode="edge")
         self.places, self.along = (_to_the_border(np.moveaxis(table, -1, 0)) for table in (origins, directions))
         self.levels = [_of_cells(self.places, self.along, self.exists)]
         while self.levels[-1].radius.size > 1:
@@ -91,10 +97,10 @@ class CellTree:
         return tuple(np.stack([np.take(table, number, axis=1) for number in at]) for table in flat)  # pyright: ignore[reportReturnType]
 
     def box(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Upper left corners of cells and their sizes, pixels, (2, M) each; the first pixel's center is (0.5, 0.5)."""
+        """Upper left corners of cells and their sizes, pixels, (2, M) each."""
         row, column = np.divmod(cell, len(self.x) - 1)
         low = np.stack([self.x[column], self.y[row]])
-        return low + 0.5, np.stack([self.x[column + 1], self.y[row + 1]]) - low
+        return low, np.stack([self.x[column + 1], self.y[row + 1]]) - low
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
@@ -106,22 +112,12 @@ def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.arctan2(_length(cross(a, b)), dot(a, b))
 
 
-def _borders(count: int) -> np.ndarray:
-    """Centers of pixels, the outermost moved to the image's border; one pixel has no cell."""
-    borders = np.arange(count, dtype=np.float64)
-    if count > 1:
-        borders[0], borders[-1] = -0.5, count - 0.5
-    return borders
-
-
 def _to_the_border(table: np.ndarray) -> np.ndarray:
-    """A table (3, H, W) whose outermost rows and columns are those at the image's border."""
+    """A table (3, H, W) with a row and a column more on each side, those at the border of the image."""
     for axis in (1, 2):
-        rows = np.moveaxis(table, axis, 0).copy()
-        if len(rows) > 1:
-            first, last = rows[0] + 0.5 * (rows[0] - rows[1]), rows[-1] + 0.5 * (rows[-1] - rows[-2])
-            rows[0], rows[-1] = first, last
-        table = np.moveaxis(rows, 0, axis)
+        rows = np.moveaxis(table, axis, 0)
+        first, last = rows[0] + 0.5 * (rows[0] - rows[1]), rows[-1] + 0.5 * (rows[-1] - rows[-2])
+        table = np.moveaxis(np.concatenate([first[None], rows, last[None]]), 0, axis)
     return np.ascontiguousarray(table)
 
 

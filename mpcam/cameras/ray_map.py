@@ -148,9 +148,8 @@ class RayMap(Camera):
             step = _newton_step(found.ray, found.slopes, point)
             # Only the derivative: the position is more exact than a step in single precision.
             u, v = (where(valid, x - (s - detach(s)), 0.0) for x, s in zip((u, v), step, strict=True))
-        origin, along = self._patch(u, v).ray
-        depth = dot(point - origin, normalize(along))
-        return Projection(vector(u, v), where(valid & (depth > 0), depth, 0.0), valid)
+        depth = norm(point - self._patch(u, v).ray.origin)
+        return Projection(vector(u, v), where(valid, depth, 0.0), valid)
 
     def _patch(self, u: Array, v: Array) -> Patch:
         return patch(self._tables(u), self.width, self.height, u, v)
