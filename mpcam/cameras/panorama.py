@@ -1,10 +1,12 @@
 """Panoramas: one center, columns by longitude, rows by latitude or by height on a cylinder."""
 
 import dataclasses
-from typing import Any, ClassVar, Self
+import math
+from typing import Any, ClassVar, Literal, Self
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.symmetric import finite_pixel
+from mpcam.cameras.tables import degrees
 from mpcam.cameras.types import Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import (
@@ -117,7 +119,25 @@ class Panorama(Camera):
         return cls(width, height, "cylindrical", camera_from_world, longitude, latitude)
 
     @classmethod
-    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Self]:
+    def from_table(
+        cls,
+        width: int,
+        height: int,
+        projection: Literal["equirectangular", "cylindrical"] = "equirectangular",
+        longitude: tuple[float, float] = (-180.0, 180.0),
+        latitude: tuple[float, float] | None = None,
+    ) -> Self:
+        """From the keys of a scene file: ranges (low, high) in degrees."""
+        ranges = [None if ends is None else tuple(map(math.radians, ends)) for ends in (longitude, latitude)]
+        return cls(width, height, projection, None, *ranges)
+
+    def to_table(self) -> dict[str, Any]:
+        """The keys that `from_table` takes, but for width and height."""
+        ranges = {name: [degrees(float(x)) for x in getattr(self, name)] for name in ("longitude", "latitude")}
+        return {"projection": self.projection, **ranges}
+
+    @classmethod
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
         """Small instances for tests and pages: whole, partial, and at their limits."""
         pose = camera_from_world
         low, high = -0.4 * PI, 0.25 * PI

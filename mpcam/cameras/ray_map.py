@@ -8,12 +8,13 @@ import numpy as np
 from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.bilinear import Line, Patch, patch
 from mpcam.cameras.capabilities import HasRays, need
-from mpcam.cameras.pose import as_pose
 from mpcam.cameras.ray_search import Made, search
 from mpcam.cameras.symmetric import finite_pixel
 from mpcam.cameras.types import Domain, Projection, Ray
+from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, cross, detach, dot, library, norm, normalize, safe_divide, vector, where
+from mpcam.math.pose import as_pose
 
 MOST_WRITTEN = 4096
 """Rays of a map that is written as text."""
@@ -28,7 +29,7 @@ class RayMap(Camera):
     number that is not finite, has no ray. Between centers, origins and directions (as they are given, not brought to
     length 1) are interpolated bilinearly, beyond the outermost ones extrapolated as far as the border of the image; a
     position has a ray if all pixels with a weight there have one. images: how many images `project` gives for each
-    point, 1 or more; of more than these the nearest count.
+    point, 2 or more; of more than these the nearest count.
 
     An image is a place whose neighbors see other points: where rays of a curve or of an area meet, at the eye of a
     central map for instance, a point has none; so it is in maps of one row or one column. Raises InputError for shapes
@@ -45,9 +46,7 @@ class RayMap(Camera):
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "camera_from_world", as_pose(self.camera_from_world))
-        if isinstance(self.images, bool) or not isinstance(self.images, (int, np.integer)) or self.images < 1:
-            raise InputError(f"RayMap(images={self.images!r}): a whole number >= 1 is needed")
-        set_(self, "images", int(self.images))
+        set_(self, "images", whole_number("images", self.images, 2, of="RayMap"))
         if library(self.origins, self.directions) == "numpy":
             origins, directions = _table(self.origins, "origins"), _table(self.directions, "directions")
             if origins.shape != directions.shape:
@@ -56,9 +55,7 @@ class RayMap(Camera):
                 )
             exists = np.isfinite(origins).all(-1) & np.isfinite(directions).all(-1) & (directions != 0).any(-1)
             for name, table in (("origins", origins), ("directions", directions)):
-                table = np.where(exists[..., None], table, 0.0)
-                table.flags.writeable = False
-                set_(self, name, table)
+                set_(self, name, _settled(table, exists))
         register_pytrees()
 
     @classmethod
@@ -72,7 +69,7 @@ class RayMap(Camera):
         return cls(np.where(valid, origins, 0.0), np.where(valid, directions, 0.0), camera.camera_from_world, images)
 
     @classmethod
-    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Self]:
+    def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
         """Small instances for tests and pages: one center, parallel, twisted, a mirror with a hole, folded."""
         x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, (np.arange(height) + 0.5) / height * 2 - 1)
         none = 0 * x
@@ -191,6 +188,15 @@ def _newton_step(ray: Line, slopes: tuple[Line, Line], point: Vector) -> tuple[A
     size, off = dot(normal, normal), cross(p, d)
     aside, downward = dot(cross(off, below), normal), dot(cross(right, off), normal)
     return safe_divide(safe_divide(aside, long), size), safe_divide(safe_divide(downward, high), size)
+
+
+def _settled(table: np.ndarray, exists: np.ndarray) -> np.ndarray:
+    """A table that does not change any more, zero where pixels have no ray; the same object if it is one already."""
+    if table.base is None and not table.flags.writeable and not table[~exists].any():
+        return table
+    table = np.where(exists[..., None], table, 0.0)
+    table.flags.writeable = False
+    return table
 
 
 def _table(values: Any, name: str) -> np.ndarray:

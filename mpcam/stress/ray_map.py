@@ -5,33 +5,38 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.pinhole import Pinhole
 from mpcam.cameras.ray_map import RayMap
-from mpcam.errors import InputError
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.ray_map_truth import Truth, truths
-from mpcam.stress.report import Case
+from mpcam.stress.report import EPS, Case, Progress, StressRow, check_counts, run_cases
+from mpcam.stress.report import LIMIT as LIMIT
 
-LIMIT = 16.0
-"""Largest error that passes, in units of eps times the condition number."""
-MODEL = "ray-map"
 IMAGES = 12
 _MAPS = 8
 """Maps of each kind."""
-Progress = Callable[[int, int, str], None]
 
 
-def run(triangles: int = 1_000_000, points: int = 200, progress: Progress | None = None) -> list[Case]:
+def run(triangles: int = 20_000, points: int = 200, progress: Progress | None = None) -> list[StressRow]:
     """All cases, `points` of each kind. Raises InputError below 1. triangles: not used, since maps bound none."""
-    if triangles < 1 or points < 1:
-        raise InputError(f"stress: triangles={triangles}, points={points}: at least 1 of each is needed")
-    cases: list[Case] = []
-    for number, kind in enumerate(KINDS):
-        if progress:
-            progress(number, len(KINDS), kind)
-        cases += projection_cases(kind, points)
-    cases += [border_case(points), ray_case(points), *lone_cases()]
-    if progress:
-        progress(len(KINDS), len(KINDS), "done")
-    return cases
+    check_counts(triangles=triangles, points=points)
+
+    def of(kind: str) -> Any:
+        return lambda: projection_rows(kind, points)
+
+    cases: list[Case] = [(kind, of(kind)) for kind in KINDS]
+    cases += [
+        ("borders of cells", lambda: [border_row(points)]),
+        ("rays", lambda: [ray_row(points)]),
+        ("what has no image", lone_rows),
+    ]
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
+
+
+def narrow_view(distance: float, width: float) -> RayMap:
+    """For distant eyes: see `distant`."""
+    return RayMap.of(Pinhole(VIEW, VIEW, focal_length(distance, width), camera_from_world=pose(distance)))
 
 
 def _grid(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -134,14 +139,14 @@ def inputs(kind: str, count: int, seed: int = 1) -> list[tuple[RayMap, np.ndarra
     return found
 
 
-def projection_cases(kind: str, count: int) -> list[Case]:
+def projection_rows(kind: str, count: int) -> list[StressRow]:
     """`project` of points that single precision holds, so that both precisions have one truth."""
-    from mpcam.rendering.device import types
+    from mpcam.backend import types
 
     given = [(camera, points.astype(np.float32).astype(np.float64)) for camera, points in inputs(kind, count)]
     exact = [truth for camera, points in given for truth in truths(camera, points)]
-    cases = []
-    for precision, eps in (("float64", 2.0**-52), ("float32", 2.0**-23)):
+    rows = []
+    for precision, eps in EPS.items():
         found = []
         for camera, points in given:
             if precision == "float64":
@@ -151,11 +156,11 @@ def projection_cases(kind: str, count: int) -> list[Case]:
             image = camera.project(types().Array3f(*points.T.astype(np.float32)))
             pixel, depth, valid = (np.stack([x.numpy() for x in part], -1) for part in image)
             found += list(zip(np.moveaxis(pixel, 0, -1), depth, valid, strict=True))
-        cases.append(judged(kind, precision, exact, found, eps))
-    return cases
+        rows.append(judged(kind, precision, exact, found, eps))
+    return rows
 
 
-def judged(kind: str, precision: str, exact: list[Truth], found: list[Any], eps: float) -> Case:
+def judged(kind: str, precision: str, exact: list[Truth], found: list[Any], eps: float) -> StressRow:
     """Images that were found against the true ones; an image belongs to the nearest true one."""
     worst, missed, invented = 0.0, 0, 0
     for truth, (pixel, depth, valid) in zip(exact, found, strict=True):
@@ -175,10 +180,10 @@ def judged(kind: str, precision: str, exact: list[Truth], found: list[Any], eps:
                 ]
                 worst = max(worst, max(error) / eps)
         missed += int((truth.sure & ~matched).sum())
-    return Case(MODEL, kind, precision, len(exact), worst, missed, invented)
+    return StressRow("random maps", f"images, {kind}", precision, len(exact), worst, missed, invented)
 
 
-def border_case(count: int) -> Case:
+def border_row(count: int) -> StressRow:
     """Points on the rays of pixels and of lines between them, where two or four cells meet: one image each."""
     rng = np.random.default_rng(5)
     missed = invented = 0
@@ -192,10 +197,10 @@ def border_case(count: int) -> Case:
         same = image.valid & (np.abs(image.pixel - pixel[:, None]).max(-1) < 1e-9)
         missed += int((~same.any(-1)).sum())
         invented += int((same.sum(-1) > 1).sum())
-    return Case(MODEL, "borders of cells", "float64", count, float("nan"), missed, invented)
+    return StressRow("random maps", "images, borders of cells", "float64", count, float("nan"), missed, invented)
 
 
-def ray_case(count: int) -> Case:
+def ray_row(count: int) -> StressRow:
     """Rays between the centers of pixels, against the bilinear formula in exact fractions."""
     from fractions import Fraction
 
@@ -222,10 +227,10 @@ def ray_case(count: int) -> Case:
         length = np.linalg.norm(along)
         off = max(np.abs(mixed(camera.origins) - origin).max(), np.abs(along - length * direction).max())
         worst = max(worst, off / (2.0**-52 * size))
-    return Case(MODEL, "rays between centers", "float64", count, worst, 0, 0)
+    return StressRow("random maps", "rays between centers", "float64", count, worst, 0, 0)
 
 
-def lone_cases() -> list[Case]:
+def lone_rows() -> list[StressRow]:
     """Where no image is isolated, or none is there: an eye, a focus, one row or column, numbers that are not finite."""
     y, x = np.mgrid[0:9, 0:9] / 4.0 - 1
     flat, ahead = np.stack([x, y, 0 * x], -1), np.stack([0 * x, 0 * x, 1 + 0 * x], -1)
@@ -235,7 +240,7 @@ def lone_cases() -> list[Case]:
     row = RayMap(flat[:1], (ahead + 0.3 * flat)[:1])
     one = RayMap(flat[:1, :1], ahead[:1, :1])
     none = RayMap(flat, 0 * ahead)
-    cases = []
+    rows = []
     for name, camera, points in (
         ("the eye of a central map", central, np.zeros((1, 3))),
         ("a focus", focus, np.array([[0.0, 0.0, 1.0]])),
@@ -248,5 +253,5 @@ def lone_cases() -> list[Case]:
     ):
         image = camera.project(points)
         wrong = int(image.valid.sum() + (~np.isfinite(image.pixel)).sum() + (~np.isfinite(image.depth)).sum())
-        cases.append(Case(MODEL, name, "float64", len(points), float("nan"), 0, wrong))
-    return cases
+        rows.append(StressRow(name, "images, none", "float64", len(points), float("nan"), 0, wrong))
+    return rows
