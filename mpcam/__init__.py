@@ -48,7 +48,9 @@ if TYPE_CHECKING:
     from mpcam.io.images import read_camera as read_camera
     from mpcam.io.images import read_channels as read_channels
     from mpcam.io.images import read_image as read_image
+    from mpcam.io.images import read_ray_map as read_ray_map
     from mpcam.io.images import write_image as write_image
+    from mpcam.io.images import write_ray_map as write_ray_map
     from mpcam.io.scenes import load_scene as load_scene
     from mpcam.math.pose import look_at as look_at
     from mpcam.pictures.environment import environment_map as environment_map
@@ -93,7 +95,7 @@ _HOMES = {
     "mpcam.geometry.mesh": "Material Mesh",
     "mpcam.geometry.surfaces": "Surface",
     "mpcam.io.calibration": "read_calibration write_calibration",
-    "mpcam.io.images": "read_camera read_channels read_image write_image",
+    "mpcam.io.images": "read_camera read_channels read_image read_ray_map write_image write_ray_map",
     "mpcam.io.scenes": "load_scene",
     "mpcam.math.pose": "look_at",
     "mpcam.pictures.environment": "environment_map",

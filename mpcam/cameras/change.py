@@ -17,11 +17,12 @@ _CENTER = {"cx": "width", "cy": "height"}
 def resized(camera: Any, width: int, height: int) -> Any:
     """The camera with an image of width x height pixels: what filled the shorter side still fills it, centres stay put.
 
-    Raises InputError for sizes below 1 pixel, and for camera models that do not say what of them is measured in pixels.
+    Panoramas keep their ranges of angles. Raises InputError for sizes below 1 pixel, and for camera models that do not
+    say what of them is measured in pixels.
     """
     names = {field.name for field in dataclasses.fields(camera)}
     lengths = [name for name in _LENGTHS if name in names]
-    if not lengths:
+    if not lengths and "longitude" not in names:
         raise InputError(f"a {type(camera).__name__} has the size that it was made with: leave out the size")
     factor = min(width, height) / min(camera.width, camera.height)
     changes: dict[str, Any] = {"width": width, "height": height}

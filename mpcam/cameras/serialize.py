@@ -15,7 +15,7 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
     """Model name, schema version and every field, as numbers, strings and nested lists.
 
     Raises InputError for a camera whose class is not in the register, or whose profile is a user's own function: no
-    file can hold them.
+    file can hold them. So it does for ray maps that are too large for text.
     """
     name = type(camera).__name__
     if not is_registered(camera):
@@ -23,6 +23,7 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
             f"a {name} cannot be written: the register of cameras has {', '.join(MODELS)}; "
             f"add yours, mpcam.cameras.MODELS[{name!r}] = {name}, or keep it in your program"
         )
+    camera._check_text()
     fields = {field: plain_value(getattr(camera, field)) for field in given_fields(camera)}
     return {"schema": SCHEMA, "model": name, **fields}
 

@@ -10,7 +10,8 @@ Which files keep what:
 Colour channels in an EXR are R, G, B and A, or Y for one channel. Depth is the channel DEPTH_CHANNEL, "ray.distance":
 the distance along the ray of the pixel. It is not called Z, since Z means the distance along an optical axis, which
 cameras with rays in all directions do not have. The camera is the string attribute CAMERA_ATTRIBUTE (JSON, exact) and,
-for other programs, the standard attribute worldToCamera in float32.
+for other programs, the standard attribute worldToCamera in float32. The rays of a ray map are six further channels, see
+`mpcam.io.ray_maps`.
 """
 
 from pathlib import Path
@@ -22,6 +23,7 @@ from mpcam.errors import InputError
 from mpcam.io import openimageio
 from mpcam.io.atomic import atomic_path
 from mpcam.io.image_formats import format_of, linear, shared_exponent, srgb_encoded
+from mpcam.io.ray_maps import is_ray_header, ray_channels, ray_header, ray_map_of
 
 DEPTH_CHANNEL = "ray.distance"
 CAMERA_ATTRIBUTE = "mpcam:camera"
@@ -42,7 +44,7 @@ def write_image(
     image: (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) floats; the fourth channel is alpha, colours are multiplied
     by it. depth: (H, W) distance along each pixel's unit ray, inf where nothing is hit. channels: further (H, W) arrays
     by name, e.g. "normal.X" or "triangle.id"; integers must fit float32 exactly (up to 2**24). camera: any mpcam camera
-    of the image's size. half: R, G, B, A or Y as 16-bit floats; depth and channels stay float32.
+    of the image's size; of a RayMap, float32 is kept. half: R, G, B, A or Y as 16-bit floats; all else stays float32.
 
     The file appears whole or not at all, and an older one is kept if writing fails. Raises InputError for wrong shapes
     and types, for what the format cannot keep (NaN in 8 bits, depth or a camera outside EXR), for finite values beyond
@@ -62,22 +64,57 @@ def write_image(
         _refuse_overflow(path, "image", pixels, np.float16)
     attributes: dict[str, Any] = {}
     if form.layers:
-        named = ({} if depth is None else {DEPTH_CHANNEL: depth}) | _named_channels(path, channels or {}, depth)
+        attributes, rays = ({}, {}) if camera is None else _camera_attributes(path, camera, width, height)
+        named = ({} if depth is None else {DEPTH_CHANNEL: depth}) | _named_channels(path, channels or {}, depth, rays)
         for name, plane in named.items():
             _check_channel_name(path, name, planes)
             planes[name] = _plane(path, "depth" if name == DEPTH_CHANNEL else name, plane, (height, width))
-        if camera is not None:
-            attributes = _camera_attributes(path, camera, width, height)
+        planes |= rays
     if form.shared_exponent:
         planes = shared_exponent(path, planes)
     if not form.floats:
         planes = srgb_encoded(path, planes)
     stored = openimageio.StoredImage(planes, attributes, linear=form.floats, unassociated=not form.floats)
+    _store(path, stored, "float" if form.floats else "uint8", COLOR_NAMES[count] if half else ())
+
+
+def write_ray_map(path, camera) -> None:
+    """Write the rays of a camera, any of mpcam's, as an EXR with six channels, which other programs can read too.
+
+    path: ends in .exr. camera: a RayMap, or another one, of which the rays of the pixels' centers are taken (see
+    `RayMap.of`). Channels are origin.X, .Y, .Z and direction.X, .Y, .Z in the camera frame (OpenCV axes), a direction
+    of zero where a pixel has no ray; the pose is in the header, once exact and once as the standard attribute
+    worldToCamera. EXR holds float32, so origins and directions lose what float64 has beyond 24 bits. Raises InputError
+    for other suffixes, for rays that float32 cannot hold, and if the file cannot be written.
+    """
+    from mpcam.cameras.base import Camera
+    from mpcam.cameras.ray_map import RayMap
+
+    if not format_of(path).layers:
+        raise InputError(f"{path}: {Path(path).suffix} files keep no rays: write an .exr file")
+    if not isinstance(camera, Camera):
+        raise InputError(f"{path}: camera is a {type(camera).__name__}: give one of mpcam's cameras")
+    rays = camera if isinstance(camera, RayMap) else RayMap.of(camera)
+    attributes, planes = _camera_attributes(path, rays, rays.width, rays.height)
+    _store(path, openimageio.StoredImage(planes, attributes), "float")
+
+
+def read_ray_map(path):
+    """The RayMap in the six channels of an EXR, written by `write_ray_map`, or by another program.
+
+    Without mpcam's header the rays are taken to be in the world. Numbers come back as they are in the file, float32.
+    Raises InputError if the file is not a readable image, or has no such channels.
+    """
+    text = openimageio.load_attribute(path, CAMERA_ATTRIBUTE)
+    header = str(text) if text is not None and is_ray_header(str(text)) else None
+    return ray_map_of(path, openimageio.load(path).planes, header)
+
+
+def _store(path, image: openimageio.StoredImage, kind: str, half: tuple[str, ...] = ()) -> None:
+    """Write an image whole or not at all."""
     with atomic_path(path) as temporary:
         try:
-            openimageio.store(
-                temporary, stored, "float" if form.floats else "uint8", half=COLOR_NAMES[count] if half else ()
-            )
+            openimageio.store(temporary, image, kind, half)
         except InputError as error:
             raise InputError(f"{path}: cannot be written ({error}): write somewhere else") from None
 
@@ -116,7 +153,8 @@ def read_channels(path) -> dict[str, np.ndarray]:
 def read_camera(path):
     """The camera that write_image stored with an image, equal to the one written; None if the file has none.
 
-    Raises InputError if the file is not a readable image, or if what it says about its camera cannot be understood.
+    A RayMap comes back as float32 holds it. Raises InputError if the file is not a readable image, or if what it says
+    about its camera cannot be understood.
     """
     text = openimageio.load_attribute(path, CAMERA_ATTRIBUTE)
     if text is None:
@@ -124,6 +162,8 @@ def read_camera(path):
     from mpcam.cameras.serialize import camera_from_json
 
     try:
+        if is_ray_header(str(text)):
+            return ray_map_of(path, openimageio.load(path).planes, str(text))
         return camera_from_json(str(text))
     except InputError as error:
         raise InputError(f"{path}: attribute {CAMERA_ATTRIBUTE}: {error}") from None
@@ -185,13 +225,16 @@ def _refuse_overflow(path, what: str, array: np.ndarray, kind) -> None:
         )
 
 
-def _named_channels(path, channels, depth) -> dict[str, Any]:
+def _named_channels(path, channels, depth, rays) -> dict[str, Any]:
     if not isinstance(channels, dict):
         raise InputError(
             f"{path}: channels is a {type(channels).__name__}: give a dict of (H, W) arrays by channel name"
         )
     if depth is not None and DEPTH_CHANNEL in channels:
         raise InputError(f"{path}: depth and channels both give {DEPTH_CHANNEL}: give one of them")
+    twice = sorted(channels.keys() & rays.keys())
+    if twice:
+        raise InputError(f"{path}: channels and the rays of the camera both give {twice[0]}: choose another name")
     return channels
 
 
@@ -203,7 +246,9 @@ def _check_channel_name(path, name, taken) -> None:
         raise InputError(f"{path}: channel name {name!r} is kept for the image's own colours: choose another")
 
 
-def _camera_attributes(path, camera, width: int, height: int) -> dict[str, Any]:
+def _camera_attributes(path, camera, width: int, height: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """What the header says of a camera, and the channels that it needs beside."""
+    from mpcam.cameras.ray_map import RayMap
     from mpcam.cameras.serialize import camera_to_json
 
     if (camera.width, camera.height) != (width, height):
@@ -211,9 +256,10 @@ def _camera_attributes(path, camera, width: int, height: int) -> dict[str, Any]:
             f"{path}: the camera is {camera.width}x{camera.height} pixels, the image {width}x{height}: "
             "give the camera that made the image"
         )
-    attributes: dict[str, Any] = {CAMERA_ATTRIBUTE: camera_to_json(camera)}
+    rays = ray_channels(path, camera) if isinstance(camera, RayMap) else {}
+    attributes: dict[str, Any] = {CAMERA_ATTRIBUTE: ray_header(camera) if rays else camera_to_json(camera)}
     pose = getattr(camera, "camera_from_world", None)
     if pose is not None:
         # EXR matrices act on row vectors from the right (Imath): point_camera = point_world @ M
         attributes["worldToCamera"] = np.asarray(pose, dtype=np.float64).T
-    return attributes
+    return attributes, rays

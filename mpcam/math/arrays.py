@@ -119,6 +119,13 @@ def take(table: Array, index: Array) -> Array:
     return table[index]
 
 
+def whole(x: Array) -> Array:
+    """Numbers that are not negative, cut to whole ones of 32 bits."""
+    if library(x) == "drjit":
+        return sys.modules["drjit"].int32_array_t(type(x))(x)
+    return np.int32(x) if library(x) == "numpy" else x.astype(np.int32)
+
+
 def detach(x: Array) -> Array:
     """The same value, without a derivative."""
     name = library(x)

@@ -9,6 +9,9 @@ from mpcam.cameras.types import Ray
 from mpcam.errors import InputError
 from mpcam.math import library
 
+FAR = 16.0
+"""Distance of the origins from the camera frame's, over their spread, from which float32 is too coarse for them."""
+
 
 def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
     """Rays of all pixels, row by row, on the device, and the point of the camera's frame (3,) from which origins count.
@@ -26,18 +29,21 @@ def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
     except (TypeError, ValueError, AttributeError, RuntimeError, InputError):
         ray = None
     numbers = () if ray is None else (*ray.origin, *ray.direction, ray.valid)
-    if ray is not None and all(library(number) == "drjit" or np.ndim(number) == 0 for number in numbers):
-        ray, anchor = Ray(t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:6]), t.Bool(ray.valid)), np.zeros(3)
+    anchor, far = np.zeros(3), False
+    if ray is None or not all(library(number) == "drjit" or np.ndim(number) == 0 for number in numbers):
+        far = True  # written for NumPy alone
+    else:
+        ray = Ray(t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:6]), t.Bool(ray.valid))
         if camera.ray_geometry == "general":
-            ray, anchor = _anchored(ray)
-    else:  # written for NumPy alone
+            ray, anchor, far = _anchored(ray)
+    if ray is None or far:
         ray, anchor = _uploaded(local_ray(np.asarray(centres.numpy(), np.float64)), camera)
     dr.eval(*ray)  # of a named tuple it would do nothing
     return ray, anchor
 
 
-def _anchored(ray: Ray) -> tuple[Ray, np.ndarray]:
-    """Rays around the middle of their origins, on the device."""
+def _anchored(ray: Ray) -> tuple[Ray, np.ndarray, bool]:
+    """Rays around the middle of their origins, on the device, and whether that is so far away that it takes float64."""
     import drjit as dr
 
     usable = ray.valid & dr.isfinite(ray.origin.x + ray.origin.y + ray.origin.z)
@@ -45,9 +51,10 @@ def _anchored(ray: Ray) -> tuple[Ray, np.ndarray]:
     ends += [dr.max(dr.select(usable, part, -dr.inf)) for part in ray.origin]
     low, high = np.array([end[0] for end in ends], np.float64).reshape(2, 3)
     if not (low <= high).all():
-        return ray, np.zeros(3)
+        return ray, np.zeros(3), False
     anchor = (0.5 * low + 0.5 * high).astype(np.float32).astype(np.float64)
-    return ray._replace(origin=dr.select(usable, ray.origin - types().Array3f(*anchor.tolist()), 0)), anchor
+    far = bool(np.abs(anchor).max() > FAR * (high - low).max())
+    return ray._replace(origin=dr.select(usable, ray.origin - types().Array3f(*anchor.tolist()), 0)), anchor, far
 
 
 def _uploaded(ray: Ray, camera: Camera) -> tuple[Ray, np.ndarray]:

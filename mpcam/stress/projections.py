@@ -17,7 +17,7 @@ from mpcam.stress.report import EPS, LIMIT, StressRow
 def image_rows(name: str, camera: Any, exact: Exact, points: dict[str, np.ndarray]) -> list[StressRow]:
     """`local_project` of points (N, 3) by kind, for cameras with one image of a point; and of points that are none."""
     rows = []
-    for kind, precision, given in _rounded(points):
+    for kind, precision, given in rounded(points):
         found = images(camera, given, precision)
         rows.append(judge_images(name, f"images, {kind}", precision, exact, given, found))
     for precision in EPS:
@@ -30,7 +30,7 @@ def image_rows(name: str, camera: Any, exact: Exact, points: dict[str, np.ndarra
 def ray_rows(name: str, camera: Any, exact: Exact, pixels: dict[str, np.ndarray]) -> list[StressRow]:
     """`local_ray` of pixels (N, 2) by kind, and of pixels that are none."""
     rows = []
-    for kind, precision, given in _rounded(pixels):
+    for kind, precision, given in rounded(pixels):
         found = rays(camera, given, precision)
         rows.append(judge_rays(name, f"rays, {kind}", precision, exact, given, found))
     for precision in EPS:
@@ -40,7 +40,7 @@ def ray_rows(name: str, camera: Any, exact: Exact, pixels: dict[str, np.ndarray]
     return rows
 
 
-def _rounded(sets: dict[str, np.ndarray]) -> Iterator[tuple[str, str, np.ndarray]]:
+def rounded(sets: dict[str, np.ndarray]) -> Iterator[tuple[str, str, np.ndarray]]:
     """Kind, precision and rows as that precision holds them, without those that it cannot."""
     for kind, given in sets.items():
         for precision in EPS:
