@@ -3,31 +3,35 @@
 import numpy as np
 
 import mpcam as mp
+from mpcam.cameras.capabilities import Bounds
+from mpcam.cameras.registry import MODELS, snake_case
 from mpcam.math import tan
 
 POSE = mp.look_at((0.3, -0.2, 0.1), (0.5, 1.0, 0.7))
 
 
-def cameras(size: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Camera]:
-    """One camera per model and field of view."""
-    w, h = size, size
+def registered(width: int = 64, height: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Camera]:
+    """The examples of all models in the register, by their names, with the model's before those that are taken."""
+    found: dict[str, mp.Camera] = {}
+    for model in MODELS.values():
+        for name, camera in model.examples(width, height, pose).items():
+            known = name in found or name == "default"
+            found[f"{snake_case(model.__name__)} {name}" if known else name] = camera
+    return found
+
+
+def own(width: int = 64, height: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Camera]:
+    """Radial cameras with a user's own profile, which no file can hold."""
     return {
-        "paraboloid": mp.Radial.paraboloid(w, h, pose),
-        "cosine_sphere": mp.Radial.cosine_sphere(w, h, pose),
-        "equisolid": mp.Radial.equisolid(w, h, pose),
-        "equidistant": mp.Radial.equidistant(w, h, pose),
-        "narrow": mp.Radial.equidistant(w, h, pose, fov=1.2),
-        "paraboloid 270": mp.Radial.paraboloid(w, h, pose, fov=1.5 * np.pi),
-        "equidistant 270": mp.Radial.equidistant(w, h, pose, fov=1.5 * np.pi),
-        "equisolid 360": mp.Radial.equisolid(w, h, pose, fov=2 * np.pi),
-        "user, convex": mp.Radial.from_function(w, h, lambda theta: tan(theta / 3), pose),
-        "user, not convex": mp.Radial.from_function(w, h, lambda theta: theta + theta**3, pose),
-        "pinhole": mp.Pinhole(w, h, 0.6 * w, 0.55 * w, 0.47 * w, 0.52 * h, pose),
-        "kannala_brandt": mp.KannalaBrandt(w, h, 0.31 * w, 0.3 * w, 0.48 * w, 0.51 * h, (0.05, -0.01, 0, 0), pose),
-        "double_sphere": mp.DoubleSphere(w, h, 0.37 * w, 0.38 * w, 0.52 * w, 0.49 * h, -0.2, 0.59, pose),
-        "unified_omni": mp.UnifiedOmni(w, h, 0.4 * w, 0.39 * w, 0.51 * w, 0.48 * h, 0.45, 1.1, pose),
-        "orthographic": mp.Orthographic(w, h, 0.4 * w, camera_from_world=pose),
+        "user, convex": mp.Radial.from_function(width, height, lambda theta: tan(theta / 3), pose),
+        "user, not convex": mp.Radial.from_function(width, height, lambda theta: theta + theta**3, pose),
     }
+
+
+def cameras(size: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Camera]:
+    """Those that bound the images of triangles."""
+    found = registered(size, size, pose) | own(size, size, pose)
+    return {name: camera for name, camera in found.items() if isinstance(camera, Bounds)}
 
 
 NAMES = list(cameras())

@@ -82,7 +82,7 @@ def soup(count: int, seed: int, size: float) -> mp.Mesh:
     return mp.Mesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
 
 
-def wrong_pixels(given: Field, mesh: mp.Mesh, hits: mp.Hits, sure: float = 1e-4) -> int:
+def wrong_pixels(given: mp.Camera, mesh: mp.Mesh, hits: mp.Hits, sure: float = 1e-4) -> int:
     """Pixels whose first hit is not what float64 brute force over all triangles finds, away from edges.
 
     sure: barycentric weights and distances that decide nothing within so much.

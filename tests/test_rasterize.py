@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
-from catalogue import NAMES, cameras, first_hits, soup
+from catalogue import soup
 
 import mpcam as mp
 from mpcam.rendering.registry import METHODS
@@ -29,35 +29,6 @@ def meshes():
         "soup": soup(3000, seed=11),
         "sphere": mp.builtin_mesh("sphere", triangles=20480),
     }
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("mesh", ["room", "temple", "soup", "sphere"])
-def test_invert_agrees_with_embree(name, mesh, meshes):
-    # Parallel rays have an absolute depth error, so that camera stands back; the others are in the middle of it all.
-    eye = (0.12, 0.07, 0.31) if name != "orthographic" else (-15.0, -20.0, 9.0)
-    camera = cameras(192, mp.look_at(eye, (0.5, 1.0, 0.7)))[name]
-    hits = mp.rasterize(camera, meshes[mesh])
-    truth = mp.rasterize(camera, meshes[mesh], method="raytrace")
-    assert_agree(hits, truth)
-    same = hits.mask & (hits.triangle == truth.triangle)
-    assert same.sum() > 0.995 * hits.mask.sum()
-    assert np.abs(hits.barycentric - truth.barycentric)[same].max(initial=0) < 0.02
-    ours, theirs = hits.points[same], truth.points[same]
-    assert np.percentile(np.linalg.norm(ours - theirs, axis=-1), 99.9, method="higher") < 1e-3 if same.any() else True
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_invert_agrees_with_brute_force_in_double_precision(name):
-    camera, mesh = cameras(40)[name], soup(300, seed=12)
-    if name == "orthographic":
-        camera = camera.with_pose(mp.look_at((-15.0, -20.0, 9.0), (0, 0, 0)))
-    hits = mp.rasterize(camera, mesh)
-    triangle, depth = first_hits(camera, mesh)
-    different = hits.triangle != triangle
-    assert different.mean() <= 2 / different.size * 2
-    same = ~different & (triangle >= 0)
-    assert np.allclose(hits.depth[same], depth[same], rtol=2e-4)
 
 
 def test_every_pixel_of_a_closed_room_is_hit():

@@ -6,7 +6,7 @@ import sys
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import NAMES, cameras
+from kit import depth_image
 from triangle_cameras import CAMERAS, around
 
 import mpcam as mp
@@ -20,25 +20,6 @@ EYE = mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7))
 def variant():
     mi.set_variant("llvm_ad_rgb")
     mp.truth.register()
-
-
-def depth_image(sensor, mesh, samples=1):
-    shape = mitsuba_mesh(mi, "mesh", mesh.vertices, mesh.faces)
-    scene = mi.load_dict({"type": "scene", "integrator": {"type": "depth"}, "mesh": shape, "sensor": sensor})
-    return np.array(mi.render(scene, spp=samples))[..., 0]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_sensor_traces_the_rays_of_the_camera(name):
-    camera = cameras(96, EYE)[name]
-    mesh = mp.builtin_mesh("temple")
-    image = depth_image(mp.truth.sensor(camera, 1, centred=True), mesh)
-    hits = mp.rasterize(camera, mesh)
-    assert image.shape == (96, 96)
-    assert ((image > 0) != hits.mask).mean() <= 2e-4
-    both = (image > 0) & hits.mask
-    close = np.abs(image[both] - hits.depth[both]) <= 1e-4 * np.maximum(hits.depth[both], 1)
-    assert close.mean() >= 0.999
 
 
 @pytest.mark.parametrize("name", ["direct", "mirror", "sizes", "lens", "mixed signs"])

@@ -54,7 +54,8 @@ CAMERAS = {
 }
 
 
-def centres(camera: mp.CameraTriangles) -> np.ndarray:
+def centres(camera: mp.Camera) -> np.ndarray:
+    """(H, W, 2) pixel centres of an image."""
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     return np.stack([u, v], -1)
 
