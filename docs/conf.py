@@ -8,7 +8,7 @@ import mpcam
 from mpcam_kernels import llvm, pipeline, pixels, samples
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 os.environ.setdefault("COLUMNS", "88")
 
 project = "mpcam"
