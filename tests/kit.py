@@ -23,7 +23,7 @@ from mpcam.cameras.registry import snake_case
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.cameras.tables import fits_a_table
 from mpcam.io.scene_camera import camera_to_toml
-from mpcam.truth.meshes import mitsuba_mesh
+from mpcam.tracing.meshes import mitsuba_mesh
 
 FEW = 4
 """Images of a point that JAX and Dr.Jit are asked for: compiling those of many camera triangles takes a minute."""

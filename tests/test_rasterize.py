@@ -139,15 +139,15 @@ def test_large_and_small_triangles_meet():
 
 def test_scenes_beyond_the_pair_budget_are_done_in_chunks(monkeypatch):
     import mpcam_kernels.pipeline as kernels
-    from mpcam.rendering import buffered
+    from mpcam.rendering import z_buffer
 
     camera = mp.Radial.paraboloid(136, 136, mp.look_at((0.1, 0, 0.2), (1, 1, 1)))
     mesh = soup(400, seed=14)
     whole = mp.rasterize(camera, mesh)
-    buffered._pipeline.cache_clear()
+    z_buffer._pipeline.cache_clear()
     monkeypatch.setattr(kernels, "PAIRS", 700)
     chunked = mp.rasterize(camera, mesh)
-    buffered._pipeline.cache_clear()
+    z_buffer._pipeline.cache_clear()
     assert np.array_equal(whole.triangle, chunked.triangle)
     assert np.array_equal(whole.depth, chunked.depth)
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from mpcam_kernels import central_named as test
+from mpcam_kernels import named_ray_triangle as test
 from mpcam_kernels.linear_fit import Channel, linear_fit, position
 from mpcam_kernels.ray_cones import EVERYWHERE, unit
 from mpcam_kernels.rows import Rows

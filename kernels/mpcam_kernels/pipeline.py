@@ -6,8 +6,8 @@ of 4 x 4 that they may cover; blocks and parts outside of the lines, and those t
 each thread takes eight pixels through their block's list with the nearest in registers. The result does not depend on
 the order of execution.
 
-The kernels know arrays and functions only: `outline` bounds a triangle's image, `test` is `central`, `planar` or
-`projected`, `output` says what is kept of a pixel.
+The kernels know arrays and functions only: `outline` bounds a triangle's image, `test` is `ray_triangle`,
+`pixel_triangle` or `screen_triangle`, `output` says what is kept of a pixel.
 """
 
 from collections.abc import Callable

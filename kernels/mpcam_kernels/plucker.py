@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from mpcam_kernels.central import follows
+from mpcam_kernels.ray_triangle import follows
 
 Float = Any
 Vector = Any

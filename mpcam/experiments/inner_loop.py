@@ -53,7 +53,7 @@ def _unrolled(prepared: Inverted, triangles: int) -> Any:
     import drjit as dr
 
     from mpcam.backend import types
-    from mpcam_kernels import central
+    from mpcam_kernels import ray_triangle
     from mpcam_kernels.frozen import frozen
     from mpcam_kernels.pixels import PER_THREAD
 
@@ -61,7 +61,7 @@ def _unrolled(prepared: Inverted, triangles: int) -> Any:
     corners = np.asarray(prepared.place(prepared.vertices)[0].numpy()).reshape(triangles, 3, 4)[..., :3]
     shapes = []
     for triangle in corners:
-        shape = central.setup(*(t.Array3f(*map(float, corner)) for corner in triangle))
+        shape = ray_triangle.setup(*(t.Array3f(*map(float, corner)) for corner in triangle))
         numbers = [[float(n) for n in np.ravel(row.numpy())] for row in (*shape.edges, shape.plane)]
         shapes.append(numbers)
     threads = prepared.camera.width * prepared.camera.height // PER_THREAD
@@ -74,9 +74,9 @@ def _unrolled(prepared: Inverted, triangles: int) -> Any:
         best, owners = [t.Float(0)] * PER_THREAD, [t.UInt(0xFFFFFFFF)] * PER_THREAD
         for number, rows in enumerate(shapes):
             *edges, plane = (t.Array3f(*row) for row in rows)
-            shape = central.CentralTriangle((edges[0], edges[1], edges[2]), plane, True)
+            shape = ray_triangle.RayTriangle((edges[0], edges[1], edges[2]), plane, True)
             for k, view in enumerate(views):
-                covered, nearness = central.hit(shape, view)
+                covered, nearness = ray_triangle.hit(shape, view)
                 better = (nearness > best[k]) | ((nearness == best[k]) & (number < owners[k]))
                 owners[k] = dr.select(covered & better, t.UInt(number), owners[k])
                 best[k] = dr.select(covered & better, nearness, best[k])

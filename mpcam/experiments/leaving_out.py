@@ -96,7 +96,7 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
     from mpcam.backend import types
     from mpcam.cameras.outline import without_lines
     from mpcam.rendering import outlines
-    from mpcam.rendering.buffered import kernel_test
+    from mpcam.rendering.z_buffer import kernel_test
     from mpcam_kernels.pipeline import SMALL, Pipeline
     from mpcam_kernels.regions import Outline
 
@@ -110,14 +110,14 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
         more = [four(lens.s, lens.p, lens.q, 0) for lens in views]
         return outlines.tight(camera, [list(pair) for pair in zip(places, more, strict=True)])
 
-    central = kernel_test("central")
-    all_blocks = SimpleNamespace(**{**vars(central), "may_hit": lambda *_: True})
+    test = kernel_test("ray_triangle")
+    all_blocks = SimpleNamespace(**{**vars(test), "may_hit": lambda *_: True})
     per_triangle, edges = without == "projection kept per vertex", without == "edge tests of blocks and parts"
     kernels = Pipeline(
         types(),
         boxes if without == "lines of the outlines" else from_positions if per_triangle else outlines.tight,
         outlines.hidden_never if per_triangle or without.startswith("hidden") else outlines.hidden_by_view,
-        all_blocks if edges else central,
+        all_blocks if edges else test,
         (scene.camera.width, scene.camera.height),
         output={"triangle numbers (depth alone)": "depth", "depths too (coverage alone)": "coverage"}.get(
             without, "hits"

@@ -116,14 +116,14 @@ class Cubemapped:
         def weights() -> tuple[Any, Any]:
             import drjit as dr
 
-            from mpcam_kernels import central, decode
+            from mpcam_kernels import decode, ray_triangle
 
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
             directions = _texel_directions(texel, self.resolution, self.half)
             front = self.faces[0]  # its frame is the camera's own
             found = decode.weights(
-                types(), central, frames[0][0][0], front.faces, triangle, directions, types().Array4f
+                types(), ray_triangle, frames[0][0][0], front.faces, triangle, directions, types().Array4f
             )
             dr.eval(found)
             return found

@@ -8,15 +8,15 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Images, Outlines, need
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.buffered import Buffered
 from mpcam.rendering.device import to_camera
 from mpcam.rendering.outlines import ROWS
 from mpcam.rendering.registry import CULLS, OUTLINE_BOUNDS
+from mpcam.rendering.z_buffer import ZBuffered
 
 ANEW = "prepare anew, by mpcam.prepare"
 
 
-class Inverted(Buffered):
+class Inverted(ZBuffered):
     """Frames by bounding each curved triangle and testing the rays of the pixels inside.
 
     Central cameras test rays through one point; parallel rays are straight in the image plane and are tested there.
@@ -44,11 +44,11 @@ class Inverted(Buffered):
             )
         if camera.ray_geometry == "central":
             need(camera, Outlines, "this prepared frame", ANEW)
-            return "central"
+            return "ray_triangle"
         need(camera, Images, "this prepared frame", ANEW)
         if camera.ray_geometry != "parallel":
             raise InputError(f"this prepared frame is not for the rays of a {type(camera).__name__}: {ANEW}")
-        return "planar"
+        return "pixel_triangle"
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr

@@ -39,11 +39,11 @@ def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     """Straight-edged image triangles; without an image where a corner is not finite."""
     import drjit as dr
 
-    from mpcam_kernels import planar
+    from mpcam_kernels import pixel_triangle
 
     a, b, c = (row[0].xyz for row in rows)
     low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
-    area = planar.turn(a, b, c)
+    area = pixel_triangle.turn(a, b, c)
     lines = []
     for p, q in ((a, b), (b, c), (c, a)):
         step = q.xy - p.xy

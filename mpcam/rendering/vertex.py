@@ -11,14 +11,14 @@ from mpcam.cameras.capabilities import Images, Projects, need
 from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.rendering.buffered import Buffered
 from mpcam.rendering.device import to_camera
+from mpcam.rendering.z_buffer import ZBuffered
 
 MOST_LEVELS = 7
 MOST_TRIANGLES = 1 << 26
 
 
-class VertexProjected(Buffered):
+class VertexProjected(ZBuffered):
     """Frames by projected vertices; each edge of the mesh is split 2**level times first.
 
     Depth and barycentric weights are linear in the image, as a game's vertex shader would have them. A corner beyond
@@ -46,14 +46,14 @@ class VertexProjected(Buffered):
         instead = "use method='invert' or 'raytrace'"
         if camera.ray_geometry != "general":
             need(camera, Images, "method='vertex'", instead)
-            return "projected" if camera.ray_geometry == "central" else "planar"
+            return "screen_triangle" if camera.ray_geometry == "central" else "pixel_triangle"
         need(camera, Projects, "method='vertex'", instead)
         if camera.images_per_point != 1:
             raise InputError(
                 f"method='vertex' needs one image for each point; a {type(camera).__name__} has up to "
                 f"{camera.images_per_point}: {instead}"
             )
-        return "projected"
+        return "screen_triangle"
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr

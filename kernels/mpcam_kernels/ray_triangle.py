@@ -11,7 +11,7 @@ Float = Any
 Vector = Any
 
 
-class CentralTriangle(NamedTuple):
+class RayTriangle(NamedTuple):
     """Edge normals (towards the inside), and the plane as n with n . x = 1 for its points x."""
 
     edges: tuple[Vector, Vector, Vector]
@@ -41,7 +41,7 @@ def turn(a: Vector, b: Vector, c: Vector) -> Float:
     return dr.dot(a, dr.cross(b - a, c - a))
 
 
-def setup(a: Vector, b: Vector, c: Vector) -> CentralTriangle:
+def setup(a: Vector, b: Vector, c: Vector) -> RayTriangle:
     """Edge functions of triangles with corners a, b, c seen from the origin; unusable where seen edge-on."""
     normal = dr.cross(b - a, c - a)
     offset = dr.dot(a, normal)
@@ -50,16 +50,16 @@ def setup(a: Vector, b: Vector, c: Vector) -> CentralTriangle:
     edges = tuple(dr.select(flip, -edge, edge) for edge in edges)
     plane = normal / offset
     usable = (offset != 0) & dr.isfinite(dr.squared_norm(plane))
-    return CentralTriangle(edges, plane, usable)  # pyright: ignore[reportArgumentType]
+    return RayTriangle(edges, plane, usable)  # pyright: ignore[reportArgumentType]
 
 
-def inside(triangle: CentralTriangle, direction: Vector) -> Any:
+def inside(triangle: RayTriangle, direction: Vector) -> Any:
     """Whether rays run between the three edges; false for a direction of zero length."""
     e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
     return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (e0 + e1 + e2 > 0)
 
 
-def hit(triangle: CentralTriangle, direction: Vector) -> tuple[Any, Float]:
+def hit(triangle: RayTriangle, direction: Vector) -> tuple[Any, Float]:
     """Whether rays run between the three edges, and the inverse of the distance along a unit direction.
 
     Rays hit where both hold: between the edges, and an inverse distance above zero.
@@ -68,14 +68,14 @@ def hit(triangle: CentralTriangle, direction: Vector) -> tuple[Any, Float]:
     return (e0 >= 0) & (e1 >= 0) & (e2 >= 0), dr.dot(triangle.plane, direction)
 
 
-def weights(triangle: CentralTriangle, direction: Vector) -> tuple[Float, Float]:
+def weights(triangle: RayTriangle, direction: Vector) -> tuple[Float, Float]:
     """Barycentric weights of corners b and c at the point that a ray hits."""
     e0, e1, e2 = (dr.dot(edge, direction) for edge in triangle.edges)
     scale = 1.0 / (e0 + e1 + e2)
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: CentralTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+def may_hit(triangle: RayTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
     """False only where no direction of a square (see `samples.Bounds`) hits the triangle."""
     possible = triangle.usable & (spread >= 0)
     for edge in triangle.edges:
@@ -88,13 +88,13 @@ def may_hit(triangle: CentralTriangle, centre: Vector, right: Vector, down: Vect
 ROWS = 3  # rows of four numbers that a set-up packs into
 
 
-def pack(types: Any, triangle: CentralTriangle) -> list[Any]:
+def pack(types: Any, triangle: RayTriangle) -> list[Any]:
     """The set-up in rows of four numbers."""
     return [types.Array4f(e.x, e.y, e.z, part) for e, part in zip(triangle.edges, triangle.plane, strict=True)]
 
 
-def unpack(rows: list[Any]) -> CentralTriangle:
+def unpack(rows: list[Any]) -> RayTriangle:
     """The set-up of a usable triangle from its rows."""
     kind = type(rows[0].xyz)
     edges = (rows[0].xyz, rows[1].xyz, rows[2].xyz)
-    return CentralTriangle(edges, kind(rows[0].w, rows[1].w, rows[2].w), True)
+    return RayTriangle(edges, kind(rows[0].w, rows[1].w, rows[2].w), True)

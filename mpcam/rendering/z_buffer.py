@@ -55,16 +55,16 @@ def _pipeline(
 
 
 def kernel_test(name: str) -> Any:
-    """The kernels' module by name: central, planar or projected."""
+    """The kernels' module by name: ray_triangle, pixel_triangle or screen_triangle."""
     return importlib.import_module(f"mpcam_kernels.{name}")
 
 
-class Buffered:
+class ZBuffered:
     """Frames of one camera and mesh by a depth buffer.
 
-    test: "central" (rays through one point against triangles in the camera frame), "planar" (pixels against
-    straight-edged triangles in the image plane, exact for parallel rays) or "projected" (the same, for corners that
-    were projected one by one).
+    test: "ray_triangle" (rays through one point against triangles in the camera frame), "pixel_triangle" (pixels
+    against straight-edged triangles in the image plane, exact for parallel rays) or "screen_triangle" (the same, for
+    corners that were projected one by one).
     """
 
     method: ClassVar[str]
@@ -87,7 +87,7 @@ class Buffered:
         if max(camera.width, camera.height) > MOST_PIXELS:
             size = f"{camera.width}x{camera.height}"
             raise InputError(f"the camera has {size} pixels: at most {MOST_PIXELS} along a side are possible")
-        self.camera, self.test, self.curved = camera, test, test == "central"
+        self.camera, self.test, self.curved = camera, test, test == "ray_triangle"
         self.device_camera = device_camera(camera)
         self.samples = self.device_camera.directions if self.curved else self.device_camera.centres
         self.pose = self.device.pose(camera.camera_from_world)

@@ -8,7 +8,7 @@ Float = Any
 Vector = Any
 
 
-class PlanarTriangle(NamedTuple):
+class PixelTriangle(NamedTuple):
     """Edges as a corner and a direction (signed so that the inside is positive), and the corners' depths."""
 
     starts: tuple[Vector, Vector, Vector]
@@ -29,29 +29,29 @@ def turn(a: Vector, b: Vector, c: Vector) -> Float:
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 
 
-def setup(a: Vector, b: Vector, c: Vector) -> PlanarTriangle:
+def setup(a: Vector, b: Vector, c: Vector) -> PixelTriangle:
     """Edge functions of image triangles; x, y of the corners are pixels and z their depths."""
     area = turn(a, b, c)
     flip = area < 0
     pairs = [_edge(p.xy, q.xy, flip) for p, q in ((b, c), (c, a), (a, b))]
     depths = type(a)(a.z, b.z, c.z)
     starts, steps = tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
-    return PlanarTriangle(starts, steps, depths, area != 0)  # pyright: ignore[reportArgumentType]
+    return PixelTriangle(starts, steps, depths, area != 0)  # pyright: ignore[reportArgumentType]
 
 
-def _edges(triangle: PlanarTriangle, pixel: Vector) -> list[Float]:
+def _edges(triangle: PixelTriangle, pixel: Vector) -> list[Float]:
     return [
         step.x * (pixel.y - start.y) - step.y * (pixel.x - start.x)
         for start, step in zip(triangle.starts, triangle.steps, strict=True)
     ]
 
 
-def inside(triangle: PlanarTriangle, pixel: Vector) -> Any:
+def inside(triangle: PixelTriangle, pixel: Vector) -> Any:
     """Whether pixels are covered, at a depth above zero."""
     return hit(triangle, pixel)[0]
 
 
-def hit(triangle: PlanarTriangle, pixel: Vector) -> tuple[Any, Float]:
+def hit(triangle: PixelTriangle, pixel: Vector) -> tuple[Any, Float]:
     """Whether pixels are covered at a depth above zero, and the inverse of that depth, which is linear in the image."""
     e0, e1, e2 = _edges(triangle, pixel)
     total = e0 + e1 + e2
@@ -59,14 +59,14 @@ def hit(triangle: PlanarTriangle, pixel: Vector) -> tuple[Any, Float]:
     return (e0 >= 0) & (e1 >= 0) & (e2 >= 0) & (total > 0) & (depth > 0), total / depth
 
 
-def weights(triangle: PlanarTriangle, pixel: Vector) -> tuple[Float, Float]:
+def weights(triangle: PixelTriangle, pixel: Vector) -> tuple[Float, Float]:
     """Barycentric weights of corners b and c."""
     e0, e1, e2 = _edges(triangle, pixel)
     scale = 1.0 / (e0 + e1 + e2)
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: PlanarTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+def may_hit(triangle: PixelTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
     """False only where no pixel of a square (see `samples.Bounds`) is covered."""
     possible = triangle.usable & (spread >= 0)
     for value, step in zip(_edges(triangle, centre), triangle.steps, strict=True):
@@ -78,13 +78,13 @@ def may_hit(triangle: PlanarTriangle, centre: Vector, right: Vector, down: Vecto
 ROWS = 4  # rows of four numbers that a set-up packs into
 
 
-def pack(types: Any, triangle: PlanarTriangle) -> list[Any]:
+def pack(types: Any, triangle: PixelTriangle) -> list[Any]:
     """The set-up in rows of four numbers."""
     edges = [types.Array4f(p.x, p.y, s.x, s.y) for p, s in zip(triangle.starts, triangle.steps, strict=True)]
     return [*edges, types.Array4f(triangle.depths.x, triangle.depths.y, triangle.depths.z, 0)]
 
 
-def unpack(rows: list[Any]) -> PlanarTriangle:
+def unpack(rows: list[Any]) -> PixelTriangle:
     """The set-up of a usable triangle from its rows."""
     starts, steps = (rows[0].xy, rows[1].xy, rows[2].xy), (rows[0].zw, rows[1].zw, rows[2].zw)
-    return PlanarTriangle(starts, steps, rows[3].xyz, True)
+    return PixelTriangle(starts, steps, rows[3].xyz, True)
