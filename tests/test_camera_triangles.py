@@ -287,3 +287,25 @@ def test_mistakes_in_faces_and_settings():
     for settings in ({"bound": "quad"}, {"cull": "left"}, {"culling": "objects"}, {"culling": ("all",)}):
         with pytest.raises(mp.InputError):
             mp.rasterize(camera, mesh, **settings)
+
+
+@pytest.mark.parametrize("name", ["direct", "mirror", "sizes", "lens"])
+def test_images_near_a_pixel_are_those_of_its_triangle(name):
+    """The nearest of all images of a point on a pixel's ray is found in the pixel's own triangle."""
+    from mpcam.comparison.metrics import projection_distances
+
+    camera = CAMERAS[name]()
+    mesh = around(camera, 120, 0.8)
+    hits = mp.rasterize(camera, mesh)
+    rows, columns = np.nonzero(hits.mask)
+    pixels = np.stack([columns + 0.5, rows + 0.5], -1)
+    points = hits.points[rows, columns]
+    near, every = camera.project_near(points, pixels), camera.project(points)
+    away = np.where(near.valid, np.linalg.norm(near.pixel - pixels[:, None], axis=-1), np.inf).min(-1)
+    least = np.where(every.valid, np.linalg.norm(every.pixel - pixels[:, None], axis=-1), np.inf).min(-1)
+    assert near.pixel.shape[1] == camera.images_per_triangle
+    found = np.isfinite(away)
+    assert found.mean() > 0.8 and (away[found] < 0.1).all()
+    assert np.allclose(away[found], least[found], atol=1e-3)
+    ours = projection_distances(camera, mesh, hits)[rows, columns]
+    assert np.array_equal(ours, np.where(found, away, least))

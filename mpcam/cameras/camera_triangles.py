@@ -214,6 +214,15 @@ class CameraTriangles(Camera):
         register_pytrees()
         return images_of(self, points)
 
+    def project_near(self, points: np.ndarray, pixels: np.ndarray) -> Projection:
+        """Images of points (N, 3), world frame, in those camera triangles alone that pixels (N, 2) lie in.
+
+        Returns Projection with pixel (N, k, 2), depth (N, k), valid (N, k), k = images_per_triangle.
+        """
+        from mpcam.cameras.images import images_near
+
+        return images_near(self, points, pixels)
+
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
         """Images of points in the camera frame, as `project` numbers them."""
         from mpcam.cameras.images import local_images

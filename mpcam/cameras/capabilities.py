@@ -6,6 +6,8 @@ gives it more methods. The maps here are those in the camera's own frame, compon
 
 from typing import Protocol, TypeVar, runtime_checkable
 
+import numpy as np
+
 from mpcam.cameras.outline import Outline, VertexView
 from mpcam.cameras.types import Box, Projection, Ray
 from mpcam.errors import InputError
@@ -24,6 +26,13 @@ class Projects(Protocol):
     """All images of a point, with a mask: as many entries as a point can have images."""
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]: ...
+
+
+@runtime_checkable
+class ProjectsNear(Protocol):
+    """Images of points in the part of the image alone that holds a pixel each, where there are many parts."""
+
+    def project_near(self, points: np.ndarray, pixels: np.ndarray) -> Projection: ...
 
 
 @runtime_checkable

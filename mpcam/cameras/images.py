@@ -23,6 +23,15 @@ def images_of(camera: Any, points: Array) -> Projection:
     return Projection(np.moveaxis(pixel, 0, -1) if kind == "numpy" else pixel, depth, valid)
 
 
+def images_near(camera: Any, points: np.ndarray, pixels: np.ndarray) -> Projection:
+    """`CameraTriangles.project_near`."""
+    face, _, _, inside = camera.atlas.locate(pixels[:, 0], pixels[:, 1])
+    with np.errstate(all="ignore"):
+        found = _in_triangles(camera, face, camera.local(points.T))
+    u, v, depth, valid = (np.stack(np.broadcast_arrays(*(image[i] for image in found)), -1) for i in range(4))
+    return Projection(np.stack([u, v], -1), depth, valid & inside[:, None])
+
+
 def local_images(camera: Any, point: Vector) -> tuple[Any, Any, Any]:
     """Pixels, depths and validity of all images of points (3, ...) in the camera frame.
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpcam.cameras.capabilities import ProjectsNear
 from mpcam.errors import InputError
 from mpcam.math.srgb import srgb_from_linear
 
@@ -71,8 +72,9 @@ def hit_errors(hits: Any, truth: Any) -> HitErrors:
 def projection_distances(camera: Any, mesh: Any, hits: Any) -> NDArray[np.float64]:
     """Pixel distances (H, W) from each centre to the exact image of the point hit there; NaN where nothing is hit.
 
-    The point is the one that the triangle and the barycentrics name on `mesh`, projected in float64 by
-    `camera.project`; of several images the nearest counts, and with none the distance is infinite.
+    The point is the one that the triangle and the barycentrics name on `mesh`, projected in float64 by the camera, where
+    it has many parts first into that of the pixel; of several images the nearest counts, and with none the distance is
+    infinite.
     """
     triangle = np.asarray(hits.triangle)
     distance = np.full(triangle.shape, np.nan)
@@ -83,12 +85,21 @@ def projection_distances(camera: Any, mesh: Any, hits: Any) -> NDArray[np.float6
     corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)[triangle[rows, columns]]]
     first = corners[:, 0]
     points = first + weights[:, :1] * (corners[:, 1] - first) + weights[:, 1:] * (corners[:, 2] - first)
-    projection = camera.project(points)
-    pixel, valid = np.asarray(projection.pixel, np.float64), np.asarray(projection.valid)
     centre = np.stack([columns + 0.5, rows + 0.5], axis=-1)
-    each = np.where(valid, np.linalg.norm(pixel - centre[:, None, :], axis=-1), np.inf)
-    distance[rows, columns] = each.min(axis=-1)
+    nearest = np.full(len(rows), np.inf)
+    if isinstance(camera, ProjectsNear):
+        nearest = _distances(camera.project_near(points, centre), centre)
+    rest = ~np.isfinite(nearest)  # rounding puts the image of an edge into a neighboring part
+    if rest.any():
+        nearest[rest] = _distances(camera.project(points[rest]), centre[rest])
+    distance[rows, columns] = nearest
     return distance
+
+
+def _distances(projection: Any, centre: np.ndarray) -> NDArray[np.float64]:
+    """Pixels (N,) from centres to the nearest image."""
+    pixel, valid = np.asarray(projection.pixel, np.float64), np.asarray(projection.valid)
+    return np.where(valid, np.linalg.norm(pixel - centre[:, None, :], axis=-1), np.inf).min(axis=-1)
 
 
 def projection_errors(camera: Any, mesh: Any, hits: Any) -> ProjectionErrors:

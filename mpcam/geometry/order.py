@@ -6,11 +6,12 @@ BITS = 10
 
 
 def interleaved(cells: np.ndarray) -> np.ndarray:
-    """Morton numbers (N,) of whole coordinates (N, 2) or (N, 3) below 2**BITS."""
+    """Morton numbers (N,) of whole coordinates (N, 2) below 2**31, or (N, 3) below 2**21."""
     dimensions = cells.shape[1]
     result = np.zeros(len(cells), np.int64)
+    bits = int(cells.max()).bit_length() if cells.size else 0
     for axis in range(dimensions):
-        for bit in range(BITS):
+        for bit in range(bits):
             result |= (cells[:, axis].astype(np.int64) >> bit & 1) << (bit * dimensions + axis)
     return result
 

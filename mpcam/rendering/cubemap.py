@@ -134,7 +134,7 @@ class Cubemapped:
             counts = np.sum([face.count(placed) for face, (placed, _) in zip(self.faces, frames, strict=True)], 0)
             return Stats(int(counts[0]), int(counts[1]))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.faces[0].vertices)
 
 
 class Hemicubed(Cubemapped):

@@ -140,7 +140,9 @@ class GeneralRasterizer:
             tests, rendered = self._count(vertices, rays, pose)
             return Stats(int(tests), int(rendered))
 
-        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.posed(camera))
+        return Hits(
+            camera, self.mesh, self.method, triangle, depth, weights, stats, vertices, lambda: rays.posed(camera)
+        )
 
     @exclusive
     def _count(self, vertices: Any, rays: DeviceRays, pose: Any) -> np.ndarray:

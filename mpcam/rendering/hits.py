@@ -50,10 +50,12 @@ class Hits:
         depth: Any,
         weights: Callable[[], tuple[Any, Any]],
         stats: Callable[[], Stats],
+        vertices: Any,
         view: Callable[[], PosedRays] | None = None,
     ):
         self.camera, self.mesh, self.method = camera, mesh, method
         self.device_triangle, self.device_depth = triangle, depth
+        self.device_vertices = vertices  # those of the frame: scenes move
         self._weights, self._stats, self._view = weights, stats, view
 
     @cached_property

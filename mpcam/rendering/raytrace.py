@@ -77,9 +77,9 @@ class RayTraced:
         faces = self.mesh.faces if self._kept is None else self.mesh.faces[finite]
         self._scene: Any = None
         self._parameters: Any = None
+        positions = self._positions = self.device.place(vertices)
         if len(faces) == 0:
             return
-        positions = self.device.place(vertices)
         with mitsuba() as mi:
             shape = mitsuba_mesh(mi, "mesh", dr.select(dr.isfinite(positions), positions, 0.0), faces)
             self._scene = mi.load_dict({"type": "scene", "mesh": shape})
@@ -89,7 +89,7 @@ class RayTraced:
     @exclusive
     def update(self, vertices: np.ndarray) -> None:
         """New positions (V, 3) of the vertices: uploads them and rebuilds the tree."""
-        positions = self.device.place(vertices)
+        positions = self._positions = self.device.place(vertices)
         if self._scene is None or self._kept is not None or not np.isfinite(vertices).all():
             self._build(np.asarray(vertices, np.float64))  # other faces may be finite now
             return
@@ -126,6 +126,7 @@ class RayTraced:
             depth,
             lambda: (second, third),
             lambda: Stats(0, 0),
+            self._positions,
             None if self.own_rays else self._view,
         )
 

@@ -10,7 +10,7 @@ import numpy as np
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.math.pose import frame_origin
+from mpcam.rendering.device import device_mesh
 from mpcam.rendering.hits import Hits
 from mpcam.scene.scene import DirectionalLight, PointLight, Scene
 
@@ -167,21 +167,20 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
         data["ambient"] = opaque_numbers(list(scene.ambient))
         data["lights"] = [_light_numbers(light, hits) for light in scene.lights]
         if "point" in kinds or shadows:
-            data["origin"], data["depth"] = ray.origin, hits.device_depth  # pyright: ignore[reportPossiblyUnboundVariable]
+            data["vertices"], data["scale"] = hits.device_vertices, opaque_numbers([device_mesh(hits.mesh).scale])[0]
         if shadows:
             data["face_normals"] = table.face_normals
-            data["shadows"] = [one.on_device(frame_origin(hits.view.pose)) for one in shadows]
+            data["shadows"] = [one.on_device(device_mesh(hits.mesh).anchor) for one in shadows]
     kernel = _kernel(shading, kinds, table.smooth)
     return kernel(hits.device_triangle, weights, data)
 
 
 def _light_numbers(light: Any, hits: Hits) -> list[Any]:
-    """Direction to the light (world) or position (camera frame), then its strength."""
+    """Direction to the light, or its position from the mesh's anchor, in world axes; then its strength."""
     if isinstance(light, DirectionalLight):
         return opaque_numbers([*(-np.asarray(light.direction)), *light.radiance])
     assert isinstance(light, PointLight)
-    matrix = np.asarray(hits.view.pose)
-    return opaque_numbers([*(matrix[:3, :3] @ light.position + matrix[:3, 3]), *light.intensity])
+    return opaque_numbers([*(light.position - device_mesh(hits.mesh).anchor), *light.intensity])
 
 
 @functools.cache
@@ -223,7 +222,9 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
             elif not lights:
                 colour *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
             else:
-                colour *= _lit(t, data, lights, normal, face, hit)
+                # From what is hit, not along the ray, which may be bent; from the anchor, where float32 is dense.
+                point = mixed(t.Array3f, data["vertices"]) * data["scale"] if "vertices" in data else None
+                colour *= _lit(t, data, lights, normal, point, face, hit)
         return dr.select(hit, colour, _unhit(t, data))
 
     return kernel
@@ -269,26 +270,22 @@ def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> 
     return dr.select(some, upper * (1 - fy) + lower * fy, 1.0)
 
 
-def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, face: Any, hit: Any) -> Any:
+def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, point: Any, face: Any, hit: Any) -> Any:
     """Light that arrives, for a white surface: ambient and Lambert's law for each light that is not in shadow."""
     import drjit as dr
 
     total, reached = t.Array3f(*data["ambient"]), [True] * len(lights)
     if "shadows" in data:
-        # From the eye, in world axes: float32 holds the place wherever the scene is.
-        local = [data["origin"][i] + data["direction"][i] * data["depth"] for i in range(3)]
         flat = dr.gather(t.Array3f, data["face_normals"], face, hit)
-        reached = [shadow.visible(_to_world(t, data["pose"], local), flat) for shadow in data["shadows"]]
+        reached = [shadow.visible(point, flat) for shadow in data["shadows"]]
     for kind, numbers, lit in zip(lights, data["lights"], reached, strict=True):
         place, strength = t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:])
         if kind == "directional":
             arriving = dr.maximum(dr.dot(normal, place), 0)
         else:
-            origin, direction = data["origin"], data["direction"]
-            away = [place[i] - (origin[i] + direction[i] * data["depth"]) for i in range(3)]  # camera frame
-            world = _to_world(t, data["pose"], away)
-            squared = dr.maximum(dr.squared_norm(world), 1e-30)
-            arriving = dr.maximum(dr.dot(normal, world), 0) * dr.rsqrt(squared) / squared
+            away = place - point
+            squared = dr.maximum(dr.squared_norm(away), 1e-30)
+            arriving = dr.maximum(dr.dot(normal, away), 0) * dr.rsqrt(squared) / squared
         total += strength * (arriving if lit is True else dr.select(lit, arriving, 0.0))
     return total
 

@@ -237,7 +237,7 @@ class ZBuffered:
             tests, rendered = self.count(positions)
             return Stats(int(tests), int(rendered))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.view)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.vertices, self.view)
 
 
 @functools.cache
