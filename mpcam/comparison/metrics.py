@@ -72,9 +72,9 @@ def hit_errors(hits: Any, truth: Any) -> HitErrors:
 def projection_distances(camera: Any, mesh: Any, hits: Any) -> NDArray[np.float64]:
     """Pixel distances (H, W) from each centre to the exact image of the point hit there; NaN where nothing is hit.
 
-    The point is the one that the triangle and the barycentrics name on `mesh`, projected in float64 by the camera, where
-    it has many parts first into that of the pixel; of several images the nearest counts, and with none the distance is
-    infinite.
+    The point is the one that the triangle and the barycentrics name on `mesh`, projected in float64 by the camera, at
+    first into the part of the pixel alone where it has many; of several images the nearest counts, and with none the
+    distance is infinite.
     """
     triangle = np.asarray(hits.triangle)
     distance = np.full(triangle.shape, np.nan)
