@@ -106,7 +106,7 @@ def small_outline(
     ]
     low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
     high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
-    area, squares = _turn(images[0], images[1], images[2]), []
+    area, lengths = _turn(images[0], images[1], images[2]), []
     bulges = []
     for k in range(3):
         after = (k + 1) % 3
@@ -120,27 +120,35 @@ def small_outline(
         sure = sure & (along > 0) & (along * along > 0.49 * (dot(a, a) * dot(b, b)))
         turn = g0[0] * g1[1] - g0[1] * g1[0]
         chord = vector(m1[0] - m0[0], m1[1] - m0[1])
+        length = sqrt(chord[0] * chord[0] + chord[1] * chord[1])
         reach = (chord[0] * g1[1] - chord[1] * g1[0]) / where(turn != 0, turn, 1.0)
-        straight = absolute(turn) <= 1e3 * epsilon(turn) * agreement
-        reach = where(straight, 1.0, maximum(reach, 0.0))
+        # Of turns as small as rounding all that is known is how small: a fourth of it, over the chord, is the bulge.
+        least = 1e3 * epsilon(turn)
+        straight = absolute(turn) <= least * agreement
+        unknown = where(straight, 0.25 * least * length, 0.0)
+        reach = where(straight, 0.0, maximum(reach, 0.0))
         for i in (0, 1):
             crossing = m0[i] + g0[i] * reach
-            high[i] = maximum(high[i], where((g0[i] > 0) & (g1[i] < 0), crossing, high[i]))
-            low[i] = minimum(low[i], where((g0[i] < 0) & (g1[i] > 0), crossing, low[i]))
-        bulges.append(reach * (chord[0] * g0[1] - chord[1] * g0[0]))
-        squares.append(chord[0] * chord[0] + chord[1] * chord[1])
+            beyond = where(straight, maximum(m0[i], m1[i]) + unknown, crossing)
+            before = where(straight, minimum(m0[i], m1[i]) - unknown, crossing)
+            high[i] = maximum(high[i], where((g0[i] > 0) & (g1[i] < 0), beyond, high[i]))
+            low[i] = minimum(low[i], where((g0[i] < 0) & (g1[i] > 0), before, low[i]))
+        bulges.append((reach * (chord[0] * g0[1] - chord[1] * g0[0]), unknown))
+        lengths.append(length)
     # The chords' triangle turned over against the real one: an angle of the image is beyond 180 degrees.
     volume = dot(points[0], _cross_of_steps(points))
-    longest = sqrt(maximum(maximum(squares[0], squares[1]), squares[2]))
+    longest = maximum(maximum(lengths[0], lengths[1]), lengths[2])
     lined = (absolute(area) > _SHARP * longest) & (area * where(volume < 0, -1.0, 1.0) > 0)
     side = where(area < 0, -1.0, 1.0)
     lines = []
     for k in range(3):
-        m0, m1 = images[k], images[(k + 1) % 3]
-        inverse = side / sqrt(where(squares[k] > 0, squares[k], 1.0))
+        m0, m1, (bulge, unknown) = images[k], images[(k + 1) % 3], bulges[k]
+        inverse = side / where(lengths[k] > 0, lengths[k], 1.0)
         a, b = (m0[1] - m1[1]) * inverse, (m1[0] - m0[0]) * inverse
-        c = maximum(-bulges[k] * inverse, 0.0) - (a * m0[0] + b * m0[1])
-        usable = lined & (squares[k] > 0)
+        across, down = a * m0[0], b * m0[1]
+        doubt = 4 * epsilon(across) * (absolute(across) + absolute(down))  # pixels, of corners far outside of the image
+        c = maximum(-bulge * inverse, 0.0) + unknown - (across + down) + doubt
+        usable = lined & (lengths[k] > 0)
         lines.append(vector(where(usable, a, 0.0), where(usable, b, 0.0), where(usable, c, 1.0)))
     outline = Outline(vector(*low), vector(*high), finite & ~hidden, (lines[0], lines[1], lines[2]))
     return outline, sure | hidden | ~finite

@@ -18,7 +18,7 @@ FAR = 1e3
 """Images that are off by more than this many LIMIT belong to no solution."""
 
 
-def run(triangles: int = 100_000, points: int = 100, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 100_000, points: int = 80, progress: Progress | None = None) -> list[StressRow]:
     """All cases, `points` of each kind and precision. Raises InputError below 1.
 
     triangles: how many pairs of a camera triangle and a scene triangle are looked at for each kind of rays, to find

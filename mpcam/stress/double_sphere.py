@@ -66,7 +66,7 @@ def narrow_view(distance: float, width: float) -> DoubleSphere:
     return DoubleSphere(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, xi, 0.6, pose(distance))
 
 
-def run(triangles: int = 50_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []

@@ -77,7 +77,7 @@ def narrow_view(distance: float, width: float) -> KannalaBrandt:
     return KannalaBrandt(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, (0.1, -0.05, 0.01, 0), pose(distance))
 
 
-def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []

@@ -52,7 +52,7 @@ def narrow_view(distance: float, width: float) -> Pinhole:
     return Pinhole(VIEW, VIEW, focal_length(distance, width), camera_from_world=pose(distance))
 
 
-def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases: list[Case] = []

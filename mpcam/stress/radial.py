@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.radial import Radial
+from mpcam.math import tan
 from mpcam.stress.distant import SIZE as VIEW
 from mpcam.stress.distant import distant_cases, pose
 from mpcam.stress.exact import Real, parameters
@@ -17,7 +18,7 @@ SIZE = 512
 
 
 def cameras() -> dict[str, Radial]:
-    """The four profiles, and the narrowest and widest views that they allow."""
+    """The four profiles and two of a user's own, and the narrowest and widest views that they allow."""
     return {
         "paraboloid": Radial.paraboloid(SIZE, SIZE),
         "cosine_sphere": Radial.cosine_sphere(SIZE, SIZE),
@@ -30,12 +31,14 @@ def cameras() -> dict[str, Radial]:
         "equisolid 360": Radial.equisolid(SIZE, SIZE, fov=2 * np.pi),
         "equidistant 360": Radial.equidistant(SIZE, SIZE, fov=2 * np.pi),
         "paraboloid, narrow": Radial.paraboloid(SIZE, SIZE, fov=1e-6),
+        "third of a tangent": Radial.from_function(SIZE, SIZE, lambda t: tan(t / 3), name="third of a tangent"),
+        "with a cube": Radial.from_function(SIZE, SIZE, lambda t: t + t * t * t, name="with a cube"),
         "equidistant, narrow": Radial.equidistant(SIZE, SIZE, fov=1e-3, radius=1e3, cx=100.0, cy=-20.0),
     }
 
 
 def definition(camera: Radial) -> Definition:
-    """Gascuel et al. 2008, Table 1, scaled to 1 at the rim."""
+    """Gascuel et al. 2008, Table 1, and the users' own, scaled to 1 at the rim."""
     import mpmath
 
     profile = {
@@ -43,6 +46,8 @@ def definition(camera: Radial) -> Definition:
         "cosine_sphere": mpmath.sin,
         "equisolid": lambda t: mpmath.sqrt(2) * mpmath.sin(t / 2),
         "equidistant": lambda t: 2 * t / mpmath.pi,
+        "third of a tangent": lambda t: mpmath.tan(t / 3),
+        "with a cube": lambda t: t + t**3,
     }[camera.profile.name]
 
     def radius(rho: Real, z: Real, fov: Real) -> Real:
@@ -69,7 +74,7 @@ def narrow_view(distance: float, width: float) -> Radial:
     return Radial.equidistant(VIEW, VIEW, pose(distance), fov=2 * np.arctan(width / distance))
 
 
-def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases = []
