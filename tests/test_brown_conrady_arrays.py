@@ -223,7 +223,7 @@ def test_printed_on_one_line():
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (np.nan,)), "between -1e.06 and 1e.06"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, "none"), "at most 6 numbers"),
         (lambda: mp.BrownConrady(4, 4, 0, 3, 2, 2), "fx=0.*above 0"),
-        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, max_angle=2), "above 0 and at most pi / 2"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, max_angle=2), "max_angle=2.*above 0 up to 1.5708"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2).bound(np.zeros((3, 3))), "local_bound.*BrownConrady does not have"),
     ],
 )

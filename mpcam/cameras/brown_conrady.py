@@ -1,19 +1,19 @@
 """Brown and Conrady's lens: a pinhole with radial and tangential distortion, the commonest calibrated camera."""
 
 import dataclasses
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from mpcam.cameras import folds
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import FARTHEST, described
 from mpcam.cameras.distortion import Distortion, Reach
-from mpcam.cameras.fields import Number, Positive
+from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.symmetric import finite_pixel, project_centred
 from mpcam.cameras.types import Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, absolute, atan, epsilon, library, maximum, normalize, safe_sqrt, vector, where
 
-_LARGEST = 1e6  # of a coefficient
+_LARGEST = 1e30  # of a coefficient; those of telephoto lenses grow with the power of the focal length
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -45,10 +45,10 @@ class BrownConrady(Camera):
     fy: Positive
     cx: Number
     cy: Number
-    k: Any = ()
-    p: Any = ()
+    k: Annotated[Any, tuple[float, ...]] = ()
+    p: Annotated[Any, tuple[float, ...]] = ()
     camera_from_world: Any = None
-    max_angle: Number = 0.5 * PI
+    max_angle: Annotated[Any, Limits(above=0, at_most=0.5 * PI)] = 0.5 * PI
     reach: Any = dataclasses.field(default=None, init=False)
 
     ray_geometry: ClassVar[RayGeometry] = "central"
@@ -56,10 +56,6 @@ class BrownConrady(Camera):
     def __post_init__(self) -> None:
         self._check_frame()
         self._check_numbers()
-        if library(self.max_angle) == "numpy" and not 0 < self.max_angle <= 0.5 * PI:
-            raise InputError(
-                f"BrownConrady(max_angle={self.max_angle!r}): radians above 0 and at most pi / 2 are needed"
-            )
         for name, count in (("k", 6), ("p", 2)):
             object.__setattr__(self, name, _coefficients(name, getattr(self, name), count))
         numbers = (self.fx, self.fy, self.cx, self.cy, self.max_angle, *self.k, *self.p)
@@ -91,13 +87,10 @@ class BrownConrady(Camera):
 
         The radius is None where the image goes to infinity.
         """
-        _, outer, _ = self._reach()
-        p1, p2 = self.p
-        s = outer * outer
-        radius = outer * self.distortion.ratio(s)[0] + 3.0 * s * safe_sqrt(p1 * p1 + p2 * p2)
-        if library(radius) == "numpy" and (radius > 0.9 * FARTHEST or outer > 0.9 * folds.WIDEST):
-            return Domain(atan(outer), None)
-        return Domain(atan(outer), maximum(self.fx, self.fy) * radius)
+        reach = self._reach()
+        radius = maximum(self.fx, self.fy) * reach.rim
+        endless = library(radius) == "numpy" and (reach.rim > 0.9 * FARTHEST or reach.outer > 0.9 * folds.WIDEST)
+        return Domain(atan(reach.outer), None if endless else radius)
 
     @property
     def inner_angle(self) -> float:
@@ -110,13 +103,14 @@ class BrownConrady(Camera):
     def local_ray(self, pixel: Vector) -> Ray:
         """Ray of a pixel in the camera frame; valid in the image of the domain."""
         u, v, valid = finite_pixel(pixel)
-        x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
-        valid = valid & (maximum(absolute(x), absolute(y)) < 2.0 * FARTHEST)
-        x, y = where(valid, x, 0.0), where(valid, y, 0.0)
-        doubt = epsilon(x) * maximum(
-            (absolute(u) + absolute(self.cx)) / self.fx, (absolute(v) + absolute(self.cy)) / self.fy
-        )
-        x, y, found = self.distortion.undistorted(self._reach(), x, y, where(valid, doubt, 0.0))
+        u, v = (u - self.cx) / self.fx, (v - self.cy) / self.fy
+        reach = self._reach()
+        valid = valid & (maximum(absolute(u), absolute(v)) < 2.0 * FARTHEST)
+        u, v = where(valid, u, 0.0), where(valid, v, 0.0)
+        valid = valid & (u * u + v * v <= reach.rim * reach.rim * (1.0 + 16.0 * epsilon(u)))
+        # The pixel is a sum with the principal point, and rounded as that.
+        sizes = [2.0 * absolute(c) / f + absolute(a) for c, f, a in ((self.cx, self.fx, u), (self.cy, self.fy, v))]
+        x, y, found = self.distortion.undistorted(reach, u, v, epsilon(u) * maximum(*sizes))
         valid = valid & found
         zero = 0.0 * x
         x, y = where(valid, x, 0.0), where(valid, y, 0.0)

@@ -18,7 +18,7 @@ STEPS = 32
 """Of random lenses, wild ones too, none needs more than 28."""
 
 _NUDGE = 1 / 16  # of the bracket, from the end that a step would cross
-_ROUNDING = 8  # roundings in the sum that decides whether a root was found
+_ROUNDING = 2  # roundings in the sum that decides whether a root was found
 NO_EDGE = -1e6
 
 
@@ -26,12 +26,14 @@ class Reach(NamedTuple):
     """The part of the plane around the axis where the map is one to one; radii are tangents of angles.
 
     inner: the circle within which all points belong to it. outer: the circle that holds it. level: between the two, the
-    component of q along a point's azimuth must be above this and above `Distortion.edge`.
+    component of q along a point's azimuth must be above this and above `Distortion.edge`. rim: the circle, in focal
+    lengths, that holds the image.
     """
 
     inner: Array
     outer: Array
     level: Array
+    rim: Array
 
 
 class Distortion(NamedTuple):
@@ -99,11 +101,11 @@ class Distortion(NamedTuple):
     def holds(self, reach: Reach, x: Array, y: Array) -> Array:
         """Whether points are where the map is one to one."""
         s = x * x + y * y
-        inner, outer, level = reach
+        inner, outer, level, _ = reach
         along, across = self.turned(x, y)
         r = safe_sqrt(s)
         near = r <= outer * (1.0 + 4.0 * epsilon(r))
-        return near & self.unfolded(s, along, across) & ((r < inner) | (along > level * r))
+        return near & ((r < inner) | (self.unfolded(s, along, across) & (along > level * r)))
 
     def undistorted(self, reach: Reach, u: Array, v: Array, doubt: Array) -> tuple[Array, Array, Array]:
         """The point whose image is (u, v), and whether there is one where the map is one to one.
@@ -135,7 +137,7 @@ class Distortion(NamedTuple):
         shrinks, so the point leaves it once: whatever is beyond counts as above the root, and bisection holds.
         """
         length = safe_sqrt(u * u + v * v)
-        inner, outer, level = reach
+        inner, outer, level, _ = reach
 
         def at(r: Array) -> tuple[Array, ...]:
             s = r * r
@@ -149,7 +151,7 @@ class Distortion(NamedTuple):
             function = r * value + 2.0 * s * along - size
             rise = value + 2.0 * s * slope + 6.0 * r * along - r * turn
             curve = 6.0 * r * slope + 4.0 * r * s * bend + 6.0 * along - 6.0 * turn * (1.0 + s * along * inverse)
-            inside = self.unfolded(s, r * along, r * across) & ((r < inner) | (along > level))
+            inside = (r < inner) | (self.unfolded(s, r * along, r * across) & (along > level))
             return function, rise, curve, inside, *m
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -172,7 +174,8 @@ class Distortion(NamedTuple):
         zero = 0.0 * (at(0.0 * length)[0] + outer)  # of the type that the result has
         above = zero + outer
         start = where(length < above, length, above)
-        r = repeat(step, (zero, above, start, above), STEPS)[2]
+        below, _, r, _ = repeat(step, (zero, above, start, above), STEPS)
+        r = where(at(r)[3], r, below)  # the last step may have left the reach
         function, rise, _, _, x, y = at(r)
         s = r * r
         sizes = [polynomial([absolute(c) for c in part], s) for part in self.parts()]

@@ -15,6 +15,7 @@ from mpcam.cameras.calibrated import FARTHEST
 from mpcam.cameras.distortion import NO_EDGE, Distortion, Reach
 from mpcam.math import (
     Array,
+    absolute,
     atan,
     detach,
     first_true,
@@ -28,8 +29,9 @@ from mpcam.math import (
 )
 
 WIDEST = 1e5
-"""Tangent of the largest angle from the axis: 90 degrees but for 2 arc seconds, where float32 still holds R."""
+"""Tangent of the largest angle from the axis: 90 degrees but for 2 arc seconds."""
 
+_GREATEST = 1e36  # of a term of R, so that float32 holds it
 _CELLS = np.linspace(0.0, 1.0, 1025)
 _SAMPLES = np.linspace(0.0, 1.0, 257)
 _ZOOMS = 3
@@ -41,7 +43,7 @@ def reach(distortion: Distortion, max_angle: Array) -> Reach:
     numbers = (*still.k, *still.q, detach(max_angle))
     kind = library(*numbers)
     if kind == "jax":
-        return _on_grid(still, tan(detach(max_angle)))
+        return _on_grid(still, detach(max_angle))
     values = [float(number if library(number) == "numpy" else number[0]) for number in numbers]
     return _exact(tuple(values[:6]), (values[6], values[7]), values[8])
 
@@ -53,18 +55,20 @@ def _exact(k: tuple[float, ...], q: tuple[float, float], max_angle: float) -> Re
     slopes = [_even([i * c for i, c in enumerate(part)][1:]) for part in distortion.parts()]
     r = Polynomial([0.0, 1.0])
     ends, turns = _conditions(r, above, below, slopes[0] * below - above * slopes[1], distortion.size())
-    outer = min(WIDEST, float(np.tan(max_angle)) if max_angle < 0.5 * np.pi else WIDEST)
+    outer = float(_widest(k, max_angle))
     for condition in (below, *ends):
         outer = _first_change(condition.coef, outer)
     inner = outer
     for condition in turns:
         inner = _first_change(condition.coef, inner)
-    return Reach(inner, outer, float(_level(distortion, inner, outer)))
+    ring = inner < outer * (1 - 1e-14)  # else nothing but rounding
+    level = float(_level(distortion, inner, outer)) if ring else NO_EDGE
+    return Reach(inner, outer, level, float(_rim(distortion, outer)))
 
 
-def _on_grid(distortion: Distortion, widest: Array) -> Reach:
+def _on_grid(distortion: Distortion, max_angle: Array) -> Reach:
     """The same for JAX, on ever finer grids: at most 1e-10 smaller, but pairs of folds within 1e-4 may pass unseen."""
-    limit = atan(where(widest > 0, minimum(widest, WIDEST), WIDEST))
+    limit = atan(_widest(distortion.k, max_angle))
 
     def ended(theta: Array, inner: bool = False) -> Array:
         r = tan(theta)
@@ -77,7 +81,21 @@ def _on_grid(distortion: Distortion, widest: Array) -> Reach:
 
     outer = first_true(ended, limit)
     inner = first_true(functools.partial(ended, inner=True), outer)
-    return Reach(tan(inner), tan(outer), _level(distortion, tan(inner), tan(outer)))
+    inner, outer = tan(inner), tan(outer)
+    return Reach(inner, outer, _level(distortion, inner, outer), _rim(distortion, outer))
+
+
+def _rim(distortion: Distortion, outer: Array) -> Array:
+    """Radius of the image where it is widest, towards q."""
+    return outer * distortion.ratio(outer * outer)[0] + 3.0 * outer * outer * distortion.size()
+
+
+def _widest(k: tuple[Array, ...], max_angle: Array) -> Array:
+    """Radius to look for folds within."""
+    r = minimum(tan(minimum(max_angle, atan(WIDEST))), WIDEST)
+    for i, coefficient in enumerate(k):
+        r = minimum(r, (_GREATEST / maximum(absolute(coefficient), 1.0)) ** (0.5 / (i % 3 + 1)))
+    return r
 
 
 def _conditions(r: Any, above: Any, below: Any, slope: Any, size: Array) -> tuple[list[Any], list[Any]]:
@@ -91,7 +109,7 @@ def _conditions(r: Any, above: Any, below: Any, slope: Any, size: Array) -> tupl
     radial = above * below + 2.0 * s * slope
     far = FARTHEST * below - r * above - 3.0 * r * turned
     return (
-        [above + 2.0 * turned, radial + 6.0 * turned * below, far],
+        [above + 2.0 * turned, radial + 6.0 * turned * below, far, FARTHEST * below - above],
         [above - 10.0 / 3.0 * turned, radial - 6.0 * turned * below],
     )
 
