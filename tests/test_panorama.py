@@ -1,11 +1,10 @@
-"""Panoramas: the seam and the poles without cracks, against COLMAP's model, closed forms and ray tracing."""
+"""Panoramas: the seam and the poles without cracks, against COLMAP's model and closed forms."""
 
-import pickle
+from typing import Any
 
 import drjit as dr
 import jax
 import jax.numpy as jnp
-import mitsuba as mi
 import numpy as np
 import pycolmap
 import pytest
@@ -13,16 +12,12 @@ import pytest
 import mpcam as mp
 from mpcam.backend import types
 from mpcam.cameras.change import resized
-from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.rendering.device_camera import unposed
 from mpcam.stress import panorama as stress
-from mpcam.tracing.meshes import mitsuba_mesh
 from mpcam_kernels.frozen import frozen
 
 PI = np.pi
-POSE = mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7))
 TURNS = {"behind": (-PI, PI), "ahead": (0.0, 2 * PI), "askew": (-1.1, 2 * PI - 1.1)}
-EXAMPLES = list(mp.Panorama.examples(8, 4))
 
 
 def centers(camera):
@@ -30,10 +25,15 @@ def centers(camera):
     return np.stack([u.ravel(), v.ravel()], -1)
 
 
+def lens(camera) -> Any:
+    """The camera as kernels have it."""
+    return unposed(camera)
+
+
 def on_device(camera, points):
     """Pixel and validity of points (N, 3) in single precision, with the camera's numbers on the device."""
     t = types()
-    image = unposed(camera).local_project(t.Array3f(*points.T.astype(np.float32)))[0]
+    image = lens(camera).local_project(t.Array3f(*points.T.astype(np.float32)))[0]
     return image.pixel.numpy().T, image.valid.numpy()
 
 
@@ -66,7 +66,7 @@ def test_every_pixel_has_one_ray_and_every_direction_one_pixel(turn):
     back = camera.project(7 * ray.direction)
     assert back.valid.all() and np.abs(back.pixel[:, 0] - pixels).max() < 1e-9
     t = types()
-    single = unposed(camera).local_ray(t.Array2f(*pixels.T.astype(np.float32)))
+    single = lens(camera).local_ray(t.Array2f(*pixels.T.astype(np.float32)))
     assert np.all(single.valid)
     pixel, valid = on_device(camera, single.direction.numpy().T)
     assert valid.all() and np.array_equal(np.floor(pixel), np.floor(pixels))
@@ -124,52 +124,42 @@ def test_a_cylinder_keeps_vertical_lines_and_has_no_poles():
 
 
 SPECIAL = [[0, 0, -1.0], [-0.0, 0, -2.0], [0, 1.0, 0], [0, -1.0, 0], [1e-20, -1, 1e-25], [0, 0, 0], [1e-30, 1e30, 1]]
-
-
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_gradients_match_differences_and_are_finite_everywhere(name):
-    camera = mp.Panorama.examples(60, 30)[name].with_pose(np.eye(4))
-    points = np.random.default_rng(3).normal(size=(20, 3)) + [0, 0, 0.5]
-    special = [
-        [0, 0, -1.0],
-        [-0.0, 0, -2.0],
-        [0, 1.0, 0],
-        [0, -1.0, 0],
-        [1e-20, -1, 1e-25],
-        [0, 0, 0],
-        [1e-30, 1e30, 1],
-    ]
-    with jax.enable_x64(True):
-        jacobian = jax.jit(jax.vmap(jax.jacobian(lambda p: camera.project(p).pixel[0])))
-        exact = np.asarray(jacobian(jnp.asarray(points)))
-        step = 1e-6 * np.eye(3)[:, None]
-        ends = [camera.project(points + sign * step).pixel[:, :, 0] for sign in (1, -1)]
-        differences = np.moveaxis((ends[0] - ends[1]) / 2e-6, 0, -1)
-        crosses = np.abs(ends[0] - ends[1]).max((0, 2)) > 1
-        assert np.abs(exact - differences)[~crosses].max() < 1e-6 * np.abs(differences[~crosses]).max()
-        assert np.isfinite(np.asarray(jacobian(jnp.asarray(SPECIAL)))).all()
-
-        def moved(ends):
-            return jnp.sum(mp.Panorama(60, 30, camera.projection, None, ends[:2], ends[2:]).project(points).pixel)
-
-        start = np.array([-1.0, 1.5, -0.7, 0.9])
-        found, step = np.asarray(jax.jit(jax.grad(moved))(jnp.asarray(start))), 1e-6 * np.eye(4)
-        assert np.allclose(found, [(moved(start + e) - moved(start - e)) / 2e-6 for e in step], rtol=1e-5)
-    single = jax.jit(jax.vmap(jax.jacobian(lambda p: camera.project(p).pixel[0])))
-    assert np.isfinite(np.asarray(single(jnp.asarray(SPECIAL[:6], jnp.float32)))).all()
+"""On the seam, at the poles and near to them, at the center, and far apart in magnitude."""
 
 
 @pytest.mark.parametrize("make", [mp.Panorama.equirectangular, mp.Panorama.cylindrical])
-def test_gradients_of_depth_and_rays_are_finite_everywhere(make):
+def test_gradients_are_finite_everywhere(make):
     camera = make(60, 30)
+
+    def image(point):
+        found = camera.project(point)
+        return jnp.append(found.pixel[0], found.depth)
+
+    for wide, way in ((True, jax.jacrev), (True, jax.jacfwd), (False, jax.jacrev)):
+        with jax.enable_x64(wide):
+            points = jnp.asarray(SPECIAL if wide else SPECIAL[:6])
+            assert np.isfinite(np.asarray(jax.jit(jax.vmap(way(image)))(points))).all()
+    rays = jax.jit(jax.vmap(jax.jacrev(lambda pixel: camera.ray(pixel).direction)))
+    slopes = np.asarray(rays(jnp.asarray([[0.0, 0], [60, 30], [30, 0], [20, 10]])))
+    assert np.isfinite(slopes).all() and np.abs(slopes).max() > 0
+
+
+def test_gradients_in_the_ranges_hold_at_a_whole_turn_too():
+    points = np.random.default_rng(3).normal(size=(20, 3))
+
+    def total(ends, library):
+        return library.sum(mp.Panorama(60, 30, "equirectangular", None, ends[:2], ends[2:]).project(points).pixel)
+
+    start, step = np.array([-np.pi, np.pi, -0.7, 0.9]), 1e-6 * np.eye(4)
     with jax.enable_x64(True):
-        images = jax.jit(
-            jax.vmap(jax.jacfwd(lambda p: jnp.append(camera.project(p).pixel[0], camera.project(p).depth)))
-        )
-        assert np.isfinite(np.asarray(images(jnp.asarray(SPECIAL)))).all()
-        rays = jax.jit(jax.vmap(jax.jacobian(lambda q: camera.ray(q).direction)))
-        slopes = np.asarray(rays(jnp.asarray([[0.0, 0], [60, 30], [30, 0], [20, 10]])))
-        assert np.isfinite(slopes).all() and np.abs(slopes).max() > 0
+        found = np.asarray(jax.jit(jax.grad(lambda ends: total(ends, jnp)))(jnp.asarray(start)))
+    # A range longer than a turn is refused, so to one side.
+    inward = np.array([1, -1, 1, 1])
+    for number in range(4):
+        ends = [start + inward * k * step[number] for k in (0, 1, 2)]
+        values = [total(e, np) for e in ends]
+        slope = inward[number] * (-1.5 * values[0] + 2 * values[1] - 0.5 * values[2]) / 1e-6
+        assert abs(found[number] - slope) < 1e-5 * max(1, abs(slope))
 
 
 def test_frozen_kernels_take_the_ranges_as_data():
@@ -182,18 +172,8 @@ def test_frozen_kernels_take_the_ranges_as_data():
     point = t.Array3f([0.3, -2.0], [0.1, 0.2], [1.0, -0.5]) + dr.opaque(t.Float, 0)
     for longitude in ((-1.0, 1.0), (-2.0, 2.5), (0.0, 2 * PI)):
         camera = mp.Panorama.equirectangular(100, 50, longitude=longitude)
-        found = column(unposed(camera), point).numpy().T
+        found = column(lens(camera), point).numpy().T
         assert np.abs(found - camera.project(point.numpy().T).pixel[:, 0]).max() < 1e-3
-
-
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_files_hold_them(name, tmp_path):
-    camera = mp.Panorama.examples(30, 20, POSE)[name]
-    assert camera_from_json(camera_to_json(camera)) == camera == pickle.loads(pickle.dumps(camera))
-    mp.write_image(tmp_path / "a.exr", np.zeros((20, 30, 3), np.float32), camera=camera)
-    assert mp.read_camera(tmp_path / "a.exr") == camera
-    leaves, tree = jax.tree_util.tree_flatten(camera)
-    assert len(leaves) == 5 and jax.tree_util.tree_unflatten(tree, leaves) == camera
 
 
 def test_scene_files_have_degrees(tmp_path):
@@ -206,7 +186,7 @@ def test_scene_files_have_degrees(tmp_path):
 
 
 def test_another_size_keeps_the_angles():
-    camera = mp.Panorama.equirectangular(30, 20, POSE, longitude=(0, 1))
+    camera = mp.Panorama.equirectangular(30, 20, longitude=(0, 1))
     larger = resized(camera, 60, 40)
     assert np.allclose(larger.ray([60.0, 10.0]).direction, camera.ray([30.0, 5.0]).direction)
 
@@ -221,18 +201,6 @@ def test_a_closed_mesh_has_no_holes(method):
         assert mp.rasterize(camera.with_pose(np.eye(4)), cube, method=method).mask.all()
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_hits_are_those_of_the_rays(name):
-    camera = mp.Panorama.examples(300, 200, POSE)[name]
-    mesh = mp.builtin_mesh("temple")
-    ours, theirs = (mp.rasterize(camera, mesh, method=method) for method in ("invert", "raytrace"))
-    assert (ours.triangle != theirs.triangle).mean() <= 2e-4
-    both = ours.mask & theirs.mask
-    assert both.mean() > 0.2
-    ours, theirs = ours.depth[both], theirs.depth[both]
-    assert (np.abs(ours - theirs) <= 1e-4 * np.maximum(theirs, 1)).mean() >= 0.999
-
-
 def test_methods_that_cannot_serve_it_say_so():
     camera, mesh = mp.Panorama.equirectangular(8, 4), mp.builtin_mesh("cube")
     with pytest.raises(mp.InputError, match="method='vertex' needs one image for each point .* Panorama does not have"):
@@ -241,19 +209,6 @@ def test_methods_that_cannot_serve_it_say_so():
         mp.rasterize(camera, mesh, method="hemicube")
     with pytest.raises(mp.InputError, match=r"bound\(\) needs boxes"):
         camera.bound(np.eye(3))
-
-
-def test_mitsuba_traces_its_rays():
-    mi.set_variant("llvm_ad_rgb")
-    mp.truth.register()
-    camera, mesh = mp.Panorama.equirectangular(128, 64, POSE), mp.builtin_mesh("temple")
-    shape = mitsuba_mesh(mi, "mesh", mesh.vertices, mesh.faces)
-    sensor = mp.truth.sensor(camera, 1, centred=True)
-    scene = mi.load_dict({"type": "scene", "integrator": {"type": "depth"}, "mesh": shape, "sensor": sensor})
-    image, hits = np.array(mi.render(scene, spp=1))[..., 0], mp.rasterize(camera, mesh)
-    assert ((image > 0) != hits.mask).mean() <= 2e-4
-    both = hits.mask & (image > 0)
-    assert (np.abs(image[both] - hits.depth[both]) <= 1e-4 * np.maximum(hits.depth[both], 1)).mean() >= 0.999
 
 
 MISTAKES = [

@@ -146,7 +146,6 @@ class Panorama(Camera):
             "equirectangular, part": cls.equirectangular(
                 width, height, pose, longitude=(-1.2, 2.0), latitude=(low, high)
             ),
-            "equirectangular, seam ahead": cls.equirectangular(width, height, pose, longitude=(0.0, 2 * PI)),
             "cylindrical": cls.cylindrical(width, height, pose),
             "cylindrical, steep": cls.cylindrical(
                 width, height, pose, longitude=(-0.5, 0.7), latitude=(low, 0.47 * PI)

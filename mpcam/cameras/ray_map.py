@@ -61,16 +61,17 @@ class RayMap(Camera):
     @classmethod
     def of(cls, camera: Camera, images: int = 4) -> Self:
         """The rays of another camera at the centers of its pixels, in its frame and with its pose."""
+        local_ray = need(camera, HasRays, "RayMap.of()").local_ray
         v, u = np.indices((camera.height, camera.width)) + 0.5
         with np.errstate(invalid="ignore", over="ignore"):
-            ray = need(camera, HasRays, "RayMap.of()").local_ray(np.stack([u, v]))
+            ray = local_ray(np.stack([u, v]))
         valid = np.asarray(ray.valid)[..., None]
         origins, directions = (np.moveaxis(np.asarray(part, np.float64), 0, -1) for part in (ray.origin, ray.direction))
         return cls(np.where(valid, origins, 0.0), np.where(valid, directions, 0.0), camera.camera_from_world, images)
 
     @classmethod
     def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
-        """Small instances for tests and pages: one center, parallel, twisted, a mirror with a hole, folded."""
+        """One center, twisted, a mirror with a hole, and folded, in numbers that an EXR holds."""
         x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, (np.arange(height) + 0.5) / height * 2 - 1)
         none = 0 * x
         normal = np.stack([0.5 * x, 0.5 * y, -1 + 0.1 * (x * x + y * y)], -1)  # of a bowl that is seen from z = -3
@@ -81,7 +82,6 @@ class RayMap(Camera):
         hole = (x - 0.2) ** 2 + y**2 < 0.15
         maps = {
             "central": (np.stack([none, none, none], -1), np.stack([x, y, 1 + none], -1)),
-            "parallel": (np.stack([x, y, none], -1), np.stack([none, none, 2 + none], -1)),
             "twisted": (
                 0.5 * np.stack([x, y, none], -1),
                 np.stack([0.6 * x - 0.4 * y, 0.6 * y + 0.4 * x, 1 + none], -1),
@@ -89,7 +89,8 @@ class RayMap(Camera):
             "mirror with a hole": (bowl, np.where(hole[..., None], np.nan, mirrored)),
             "folded": (np.stack([x, y, none], -1), np.stack([0.8 * x * x - 0.9 * x, 0.2 * y, 1 + none], -1)),
         }
-        return {name: cls(origins, rays, camera_from_world) for name, (origins, rays) in maps.items()}
+        single = {name: [table.astype(np.float32) for table in tables] for name, tables in maps.items()}
+        return {name: cls(origins, rays, camera_from_world) for name, (origins, rays) in single.items()}
 
     @property
     def width(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -135,7 +136,11 @@ class RayMap(Camera):
         recorded. JAX calls back to the host, under `jit` too; derivatives are those of the implicit function.
         """
         pixels, valid = search(self, point)
-        return tuple(self._image(point, pixels[k][0], pixels[k][1], valid[k]) for k in range(self.images))
+        numbers = range(self.images)
+        if library(point) == "drjit":
+            return tuple(self._image(point, pixels[k][0], pixels[k][1], valid[k]) for k in numbers)
+        every = self._image(point[:, None], pixels[:, 0], pixels[:, 1], valid)
+        return tuple(Projection(every.pixel[:, k], every.depth[k], every.valid[k]) for k in numbers)
 
     def _image(self, point: Vector, u: Array, v: Array, valid: Array) -> Projection:
         """The image near a pixel position, which is given without derivatives."""
