@@ -4,13 +4,11 @@ import kit
 import pytest
 from catalogue import POSE, own, registered
 
-REGISTERED = registered(*kit.SMALL, POSE)
-CAMERAS = {size: registered(*size, POSE) | own(*size, POSE) for size in (kit.SMALL, kit.LARGE)}
+REGISTERED = registered(64, 48, POSE)
 CASES = [
-    pytest.param(check, camera, id=f"{check.__name__}-{name}")
-    for check, (capability, size) in kit.CHECKS.items()
-    for name, camera in CAMERAS[size].items()
-    if isinstance(camera, capability)
+    pytest.param(check.run, camera, id=f"{check.run.__name__}-{name}")
+    for check in kit.CHECKS
+    for name, camera in kit.applying(registered(*check.size, POSE) | own(*check.size, POSE), check).items()
 ]
 
 

@@ -28,6 +28,15 @@ def camera_to_dict(camera: Camera) -> dict[str, Any]:
     return {"schema": SCHEMA, "model": name, **fields}
 
 
+def can_be_written(camera: Camera) -> bool:
+    """Whether `camera_to_dict` takes a camera."""
+    try:
+        camera_to_dict(camera)
+    except InputError:
+        return False
+    return True
+
+
 def camera_from_dict(data: dict[str, Any]) -> Camera:
     """The camera that `camera_to_dict` described: lists of numbers come back as the tuples that fields hold.
 

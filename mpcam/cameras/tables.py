@@ -69,7 +69,7 @@ def arguments(model: type, width: int, height: int, keys: Mapping[str, Any]) -> 
     rest: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in keys.items()}
     parameters = inspect.signature(model).parameters
     found: dict[str, Any] = {"width": width, "height": height}
-    if "focal" in rest:
+    if "focal" in rest and "fx" in parameters:
         found["fx"], found["fy"] = rest.pop("focal")
     if "cx" in parameters and "cy" in parameters:
         found["cx"], found["cy"] = rest.pop("center", None) or (0.5 * width, 0.5 * height)
