@@ -75,5 +75,5 @@ def test_a_wrong_domain_would_be_found():
     with mpmath.workdps(DIGITS):
         folds, exact = oracle(camera)
         assert brown_conrady.domain_row("x", camera, folds, exact).good()
-        narrower = dataclasses.replace(camera, max_angle=camera.domain.max_angle - 1e-13)
+        narrower = dataclasses.replace(camera, max_angle=float(camera.domain.max_angle or 0) - 1e-13)
         assert brown_conrady.domain_row("x", narrower, folds, exact).worst > LIMIT

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from catalogue import POSE, registered, soup
+from catalog import POSE, registered, soup
 from ray_fields import wrong_pixels
 
 import mpcam as mp
@@ -94,7 +94,8 @@ def test_tables_go_to_the_device_once_for_all_poses():
     camera.ray(pixel)
     tables = camera.made.tables(device.Float)
     moved = camera.with_pose(POSE)
-    moved.ray(pixel), moved.project([0.0, 0, 1])
+    moved.ray(pixel)
+    moved.project([0.0, 0, 1])
     assert moved.made is camera.made and camera.made.tables(device.Float) is tables
     assert moved.origins is camera.origins
     again = pickle.loads(pickle.dumps(moved))
