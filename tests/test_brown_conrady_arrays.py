@@ -220,7 +220,7 @@ def test_printed_on_one_line():
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, 0.1), r"k=0.1\): at most 6 numbers are needed"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, [0.0] * 7), "at most 6 numbers"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (), (1, 2, 3)), r"p=\(1, 2, 3\)\): at most 2 numbers"),
-        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (np.nan,)), "between -1e.06 and 1e.06"),
+        (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, (np.nan,)), "between -1e.30 and 1e.30"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, "none"), "at most 6 numbers"),
         (lambda: mp.BrownConrady(4, 4, 0, 3, 2, 2), "fx=0.*above 0"),
         (lambda: mp.BrownConrady(4, 4, 3, 3, 2, 2, max_angle=2), "max_angle=2.*above 0 up to 1.5708"),
