@@ -75,7 +75,7 @@ class Sample:
     """A pixel of a lens and the answers for it.
 
     angle: degrees of its true ray from the axis, NaN if it has none. azimuth: degrees from u towards v. radius: from
-    the centre, in focal lengths. opencv: None where OpenCV does not have the model.
+    the center, in focal lengths. opencv: None where OpenCV does not have the model.
     """
 
     lens: str
@@ -130,7 +130,7 @@ def published_radius(lens: Lens, theta: Any) -> Any:
 
 
 def plane_point(lens: Lens, pixel: np.ndarray) -> tuple[Any, Any, Any]:
-    """A pixel (2,) relative to the centre in focal lengths, and its distance from there, in mpmath."""
+    """A pixel (2,) relative to the center in focal lengths, and its distance from there, in mpmath."""
     x, y = (mpf(float(pixel[0])) - lens.cx) / lens.fx, (mpf(float(pixel[1])) - lens.cy) / lens.fy
     return x, y, mpmath.hypot(x, y)
 
@@ -157,7 +157,7 @@ def angle_between(a: list[Any], b: list[Any]) -> float:
 def opencv_rays(lens: Lens, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Directions (N, 3) that OpenCV gives pixels (N, 2), and whether it gives one (N,). None: it has no such model.
 
-    Its pixels lie half a pixel to the upper left of ours, and so does its centre: the two cancel.
+    Its pixels lie half a pixel to the upper left of ours, and so does its center: the two cancel.
     """
     matrix: Any = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1]])
     if isinstance(lens, mpcam.KannalaBrandt):
@@ -198,7 +198,7 @@ def judge(lens: Lens, pixel: np.ndarray, truth: list[Any] | None, given: np.ndar
 
 
 def farthest_corner(lens: Lens) -> np.ndarray:
-    """Corner (2,) of the image that is farthest from the centre, relative to it, in focal lengths."""
+    """Corner (2,) of the image that is farthest from the center, relative to it, in focal lengths."""
     u, v = np.meshgrid([0.0, lens.width], [0.0, lens.height])
     corners = np.stack([(u.ravel() - lens.cx) / lens.fx, (v.ravel() - lens.cy) / lens.fy], -1)
     return corners[np.argmax(np.hypot(*corners.T))]

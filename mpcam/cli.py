@@ -297,7 +297,7 @@ def experiment(
 
     from mpcam.comparison.progress import bar
     from mpcam.experiments import run
-    from mpcam.experiments.catalogue import EXPERIMENTS
+    from mpcam.experiments.catalog import EXPERIMENTS
     from mpcam.experiments.terminal import WIDTH, print_experiments, print_report
 
     console = Console(quiet=quiet or json, width=None if sys.stdout.isatty() else WIDTH)

@@ -114,7 +114,7 @@ def surround(
     /,
     *,
     output: Path,
-    centre: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,1",
+    center: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,1",
     radius: float = 2.0,
     height: float = 2.0,
     columns: int = 20,
@@ -129,7 +129,7 @@ def surround(
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
-        centre: Middle of the strip, x,y,z.
+        center: Middle of the strip, x,y,z.
         radius: Of the strip, scene units.
         height: Of the strip, scene units.
         columns: Cells around, two camera triangles each.
@@ -155,7 +155,7 @@ def surround(
     check_machine()
     loaded = load(scene, None).scene
     cams = strip(
-        read_point(centre, "--centre"),
+        read_point(center, "--center"),
         radius,
         height,
         columns,

@@ -13,9 +13,9 @@ import jax
 import jax.numpy as jnp
 import mitsuba as mi
 import numpy as np
-from catalogue import soup
+from catalog import soup
 from ray_fields import wrong_pixels
-from triangle_cameras import centres
+from triangle_cameras import centers
 
 import mpcam as mp
 from mpcam.cameras.capabilities import Bounds, HasRays, Projects
@@ -69,7 +69,7 @@ def points_on(ray: mp.Ray, distance: np.ndarray) -> np.ndarray:
 
 def rays_are_rays(camera: mp.Camera) -> None:
     """Unit directions and the shapes of the input; what is no number has no ray, and no NaN comes back."""
-    ray = camera.ray(centres(camera))
+    ray = camera.ray(centers(camera))
     shape = (camera.height, camera.width)
     assert ray.valid.shape == shape and ray.origin.shape == ray.direction.shape == (*shape, 3)
     assert np.abs(np.linalg.norm(ray.direction[ray.valid], axis=-1) - 1).max() < 1e-14
@@ -272,7 +272,7 @@ def hits_are_those_of_embree(camera: mp.Camera) -> None:
     """By `invert`, by ray tracing, and as a Mitsuba sensor; and the order of the faces does not matter."""
     for mesh in (scene(), mp.builtin_mesh("temple")):
         hits, truth = mp.rasterize(camera, mesh), mp.rasterize(camera, mesh, method="raytrace")
-        image = depth_image(mp.truth.sensor(camera, 1, centred=True), mesh)
+        image = depth_image(mp.truth.sensor(camera, 1, centered=True), mesh)
         assert hits.mask.mean() > 0.1
         for depth in (truth.depth, np.where(image > 0, image, np.inf)):
             assert (hits.mask != np.isfinite(depth)).mean() <= 2e-4

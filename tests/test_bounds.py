@@ -3,7 +3,7 @@
 import drjit.llvm as types
 import numpy as np
 import pytest
-from catalogue import NAMES, cameras, triangles
+from catalog import NAMES, cameras, triangles
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kit import extent
@@ -56,8 +56,8 @@ def test_boxes_hold_in_float32_kernels(camera, quick):
 def test_lines_of_outlines_hold_every_sampled_point(name, precision, size):
     """And they are there for small triangles, and touch them."""
     camera, rng = cameras(512)[name], np.random.default_rng(11)
-    centre = camera.ray(rng.uniform(100, 412, (3000, 1, 2))).direction
-    corners = (centre + size * rng.normal(size=(3000, 3, 3))).astype(np.float32).astype(np.float64)
+    center = camera.ray(rng.uniform(100, 412, (3000, 1, 2))).direction
+    corners = (center + size * rng.normal(size=(3000, 3, 3))).astype(np.float32).astype(np.float64)
     s = np.linspace(0, 1, 65)[:, None]
     edges = np.concatenate([corners[:, [i]] * (1 - s) + corners[:, [(i + 1) % 3]] * s for i in range(3)], 1)
     image = camera.project(edges)

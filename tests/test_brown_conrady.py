@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pycolmap
 import pytest
-from catalogue import POSE
+from catalog import POSE
 
 import mpcam as mp
 

@@ -12,7 +12,7 @@ import jax
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import POSE
+from catalog import POSE
 from test_brown_conrady import LENSES, stretch
 
 import mpcam as mp
@@ -177,7 +177,7 @@ def test_mitsuba_traces_the_rays_of_the_camera(name):
     camera = mp.BrownConrady.examples(96, 72, mp.look_at((0.12, 0.07, 0.31), (0.5, 1.0, 0.7)))[name]
     mesh = mp.builtin_mesh("temple")
     shape = mitsuba_mesh(mi, "mesh", mesh.vertices, mesh.faces)
-    sensor = mp.truth.sensor(camera, 1, centred=True)
+    sensor = mp.truth.sensor(camera, 1, centered=True)
     scene = mi.load_dict({"type": "scene", "integrator": {"type": "depth"}, "mesh": shape, "sensor": sensor})
     image = np.array(mi.render(scene, spp=1))[..., 0]
     hits = mp.rasterize(camera, mesh, method="raytrace")

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 import pycolmap
 import pytest
-from catalogue import cameras, triangles
+from catalog import cameras, triangles
 from test_bounds import assert_holds, extent
 from test_rasterize import assert_agree
 
@@ -43,7 +43,7 @@ EXTREME = {
     "fisheye": mp.UnifiedOmni.mei(64, 64, 60, 61, 30, 33, 2.3),
     "orthographic sphere": mp.UnifiedOmni(64, 64, 30, 31, 30, 33, 1.0, 0.7),
     "narrow double sphere": mp.DoubleSphere(64, 64, 30, 31, 30, 33, -0.5, 0.1),
-    "centre outside": mp.DoubleSphere(64, 64, 50, 51, 30, 33, 1.5, 0.3),
+    "center outside": mp.DoubleSphere(64, 64, 50, 51, 30, 33, 1.5, 0.3),
     "spheres touch": mp.DoubleSphere(64, 64, 40, 41, 30, 33, 1.0, 0.5),
 }
 
@@ -269,8 +269,8 @@ def test_boxes_hold(lens):
 def test_boxes_are_tight_in_the_image(lens):
     """No more than a tenth of a pixel beyond dense samples, for triangles whose image lies in the picture."""
     rng = np.random.default_rng(9)
-    centre = lens.ray(rng.uniform(0.2, 0.8, (400, 1, 2)) * [lens.width, lens.height])
-    corners = (centre.direction + 0.2 * rng.normal(size=(400, 3, 3)))[centre.valid[:, 0]]
+    center = lens.ray(rng.uniform(0.2, 0.8, (400, 1, 2)) * [lens.width, lens.height])
+    corners = (center.direction + 0.2 * rng.normal(size=(400, 3, 3)))[center.valid[:, 0]]
     s = np.linspace(0, 1, 401)[:, None]
     edges = np.concatenate([corners[:, [i]] * (1 - s) + corners[:, [(i + 1) % 3]] * s for i in range(3)], 1)
     image = lens.project(edges)

@@ -1,4 +1,4 @@
-"""Calibration files: each format against its own program, round trips, pixel centres, and axes."""
+"""Calibration files: each format against its own program, round trips, pixel centers, and axes."""
 
 import json
 from typing import Any
@@ -165,7 +165,7 @@ def test_ros_camera_info_is_read(tmp_path):
 
 
 def test_half_a_pixel():
-    """The centre of the first pixel is (0, 0) for OpenCV and Kalibr, (0.5, 0.5) here, for COLMAP and nerfstudio.
+    """The center of the first pixel is (0, 0) for OpenCV and Kalibr, (0.5, 0.5) here, for COLMAP and nerfstudio.
 
     A camera whose axis goes through the middle of a 4 x 2 image has its principal point at (1.5, 0.5) there.
     """

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from catalogue import first_hits, soup
-from triangle_cameras import CAMERAS, FACES, QUAD, around, centres, mixed, patch
+from catalog import first_hits, soup
+from triangle_cameras import CAMERAS, FACES, QUAD, around, centers, mixed, patch
 
 import mpcam as mp
 from mpcam.math.optics import reflect, refract
@@ -14,7 +14,7 @@ from mpcam.rendering.general import GeneralRasterizer
 
 def test_every_triangle_has_its_pixels_and_no_two_touch():
     camera = patch(resolution=np.arange(3, 21) * 3)
-    ray = camera.ray(centres(camera))
+    ray = camera.ray(centers(camera))
     face, x, y = (values.reshape(camera.height, camera.width) for values in camera.atlas.places)
     sides = np.asarray(camera.resolution)
     assert np.array_equal(np.bincount(face[face >= 0]), sides * (sides + 1) // 2)
@@ -38,7 +38,7 @@ def test_corners_of_the_image_are_vertices_and_their_rays():
 
 
 @pytest.mark.parametrize("name", ["direct", "lengths", "mirror", "lens"])
-def test_neighbours_share_the_rays_of_their_edge(name):
+def test_neighbors_share_the_rays_of_their_edge(name):
     camera = CAMERAS[name]()
     rng = np.random.default_rng(1)
     edges: dict = {}
@@ -118,11 +118,11 @@ def test_hits_are_those_of_brute_force(name, size):
     assert (~same).sum() <= 2
     hit = same & (triangle >= 0)
     # The depth's error grows as rays graze their triangle.
-    cosine = np.abs((mesh.face_normals[triangle] * camera.ray(centres(camera)).direction).sum(-1))
+    cosine = np.abs((mesh.face_normals[triangle] * camera.ray(centers(camera)).direction).sum(-1))
     assert (np.abs(hits.depth[hit] - depth[hit]) * cosine[hit]).max() < 2e-6 * np.ptp(mesh.bounds)
     assert np.isinf(hits.depth[same & ~hit]).all()
     # Also with each place and normal of the hit: the barycentric weights name the point on the ray.
-    ray = camera.ray(centres(camera))
+    ray = camera.ray(centers(camera))
     reached = ray.origin + np.where(hits.mask, hits.depth, 0)[..., None] * ray.direction
     assert np.median(np.abs(hits.points - reached)[hit]) < 1e-5
 

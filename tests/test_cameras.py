@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import mpmath
 import numpy as np
 import pytest
-from catalogue import NAMES, POSE, cameras, own
+from catalog import NAMES, POSE, cameras, own
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_json
@@ -20,9 +20,9 @@ def camera(request):
     return cameras(64, POSE)[request.param]
 
 
-def test_centre_ray_runs_along_the_axis(camera):
-    centre = [camera.cx, camera.cy]
-    ray = camera.ray(centre)
+def test_center_ray_runs_along_the_axis(camera):
+    center = [camera.cx, camera.cy]
+    ray = camera.ray(center)
     assert ray.origin.shape == ray.direction.shape == (3,)
     assert ray.valid
     assert np.allclose(ray.direction, np.asarray(camera.camera_from_world)[2, :3], atol=1e-15)

@@ -343,7 +343,7 @@ def test_as_paths_over_the_true_surface(name):
         ({"radius": np.nan}, "radius"),
         ({"reflectance": (1, 2, 3)}, "reflectance"),
         ({"back": BALL}, "back"),
-        ({"camera": mp.Orthographic(8, 8, 1.0)}, "centre"),
+        ({"camera": mp.Orthographic(8, 8, 1.0)}, "center"),
         ({"camera": None}, "camera"),
         ({"scene": mp.Mesh([], [])}, "receivers"),
         ({"triangles": 0}, "triangles"),

@@ -24,10 +24,10 @@ def pane(z: float, size: float = 4.0) -> mp.Mesh:
     return mp.Mesh([(-size, -size, z), (size, -size, z), (size, size, z), (-size, size, z)], [(0, 1, 2), (0, 2, 3)])
 
 
-def through_sphere(origin, way, centre, far: bool):
+def through_sphere(origin, way, center, far: bool):
     """Where rays meet a unit sphere, at the nearer or the farther point, and whether they do."""
-    half = ((origin - centre) * way).sum(axis=1)
-    under = half**2 - ((origin - centre) ** 2).sum(axis=1) + 1.0
+    half = ((origin - center) * way).sum(axis=1)
+    under = half**2 - ((origin - center) ** 2).sum(axis=1) + 1.0
     distance = -half + np.sqrt(np.maximum(under, 0)) * (1 if far else -1)
     return origin + distance[:, None] * way, (under > 0) & (distance > 1e-9)
 
@@ -35,9 +35,9 @@ def through_sphere(origin, way, centre, far: bool):
 def true_rays(points, normals, index):
     """The rays after both bends of what the eye sees of the first sphere: from the other one, or out of the glass."""
     way, _ = bent(points - EYE, normals, index)
-    centre = MIDDLE if index is None else np.zeros(3)
-    place, meets = through_sphere(points, way, centre, index is not None)
-    way, passes = bent(way, place - centre, None if index is None else 1 / index)
+    center = MIDDLE if index is None else np.zeros(3)
+    place, meets = through_sphere(points, way, center, index is not None)
+    way, passes = bent(way, place - center, None if index is None else 1 / index)
     return place, way, meets & passes
 
 

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import cameras, triangles
+from catalog import cameras, triangles
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -108,7 +108,7 @@ def test_a_camera_that_sees_behind_itself_leaves_the_hemicube_out():
     assert "270" in wide.left_out["hemicube"]
 
 
-def test_a_camera_without_one_centre_leaves_the_cubes_out():
+def test_a_camera_without_one_center_leaves_the_cubes_out():
     camera = Orthographic(32, 32, 8.0)
     parallel = mpcam.compare(scene(camera), repeats=1, moving=False, settings={"vertex": [0]})
     assert [row.label for row in parallel] == ["invert", "vertex level 0", "raytrace"]

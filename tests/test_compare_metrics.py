@@ -72,7 +72,7 @@ def test_images_of_different_size_are_refused():
 
 
 def exact_frame(camera, mesh, shift=(0.0, 0.0)) -> Frame:
-    """First hits on a mesh of one triangle by its plane, of rays that leave `shift` pixels beside each centre."""
+    """First hits on a mesh of one triangle by its plane, of rays that leave `shift` pixels beside each center."""
     v, u = np.mgrid[0 : camera.height, 0 : camera.width] + 0.5
     origin, direction, valid = camera.ray(np.stack([u + shift[0], v + shift[1]], -1))
     a, b, c = mesh.corners[0]
@@ -120,9 +120,9 @@ def test_rmse_and_psnr_in_display_space():
     assert metrics.image_rmse(5 * white, white) == 0.0  # both show as white
     assert metrics.psnr(metrics.image_rmse(white, white)) == np.inf
     # linear 0.2140 is display 0.5 (IEC 61966-2-1), which is 6.02 dB from black
-    grey = np.full((2, 2, 3), ((0.5 + 0.055) / 1.055) ** 2.4)
-    assert metrics.image_rmse(grey, black) == pytest.approx(0.5)
-    assert metrics.psnr(metrics.image_rmse(grey, black)) == pytest.approx(20 * np.log10(2))
+    gray = np.full((2, 2, 3), ((0.5 + 0.055) / 1.055) ** 2.4)
+    assert metrics.image_rmse(gray, black) == pytest.approx(0.5)
+    assert metrics.psnr(metrics.image_rmse(gray, black)) == pytest.approx(20 * np.log10(2))
 
 
 def test_flip_is_zero_for_equal_images_and_grows_with_the_error():

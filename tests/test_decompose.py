@@ -8,7 +8,7 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose, directions_at_vertices, subdivided
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.decomposition.reflector import reflector_of
-from mpcam.decomposition.shooting import Locator, neighbours, shoot
+from mpcam.decomposition.shooting import Locator, neighbors, shoot
 from mpcam.decomposition.simplify import simplify
 from mpcam.decomposition.views import seen_samples, surface_samples
 from mpcam.errors import InputError
@@ -54,8 +54,8 @@ def test_every_point_that_the_eye_sees_has_a_camera_triangle(made):
 def test_hidden_triangles_are_left_out(made):
     """The far cap of a sphere, and what lies outside of a camera's picture."""
     toward = EYE / np.linalg.norm(EYE)
-    centres = made["sphere"].vertices[made["sphere"].faces].mean(axis=1)
-    assert (centres @ toward).min() > -0.3
+    centers = made["sphere"].vertices[made["sphere"].faces].mean(axis=1)
+    assert (centers @ toward).min() > -0.3
     camera = mp.Pinhole(128, 128, 450, 450, 64, 64, camera_from_world=mp.look_at(EYE, (0, 0, 0.7)))
     cams = decompose(SHAPES["sphere"], camera, 104)
     u, v, z = (cams.vertices[cams.faces].mean(axis=1) @ camera.camera_from_world[:3, :3].T).T + np.reshape(
@@ -272,10 +272,10 @@ def test_closest_points_are_those_of_all_triangles():
     assert np.allclose(found, gaps.min(axis=1), atol=1e-12)
 
 
-def test_neighbours_across_edges():
+def test_neighbors_across_edges():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
-    assert neighbours(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
-    assert neighbours(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])).max() == -1  # three at one edge
+    assert neighbors(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+    assert neighbors(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])).max() == -1  # three at one edge
 
 
 def test_samples_lie_evenly_over_the_area():
@@ -298,7 +298,7 @@ BALL = Surface.sphere()
         (lambda: decompose(BALL, (1, 2, np.nan)), "three finite numbers"),
         (lambda: decompose(BALL, "eye"), "three finite numbers"),
         (lambda: decompose(BALL, (0, 0, 1)), "on the reflector"),
-        (lambda: decompose(BALL, mp.Orthographic(8, 8, 4.0)), "no common centre"),
+        (lambda: decompose(BALL, mp.Orthographic(8, 8, 4.0)), "no common center"),
         (lambda: decompose(BALL, mp.Pinhole(8, 8, 8, 8, 4, 4, mp.look_at((0, 0, 5), (0, 0, 9)))), "no pixel"),
         (lambda: decompose(BALL, EYE, 0), "from 1 to"),
         (lambda: decompose(BALL, EYE, 2.5), "whole number"),

@@ -18,11 +18,11 @@ def directions(count: int, seed: int = 0) -> np.ndarray:
     return np.vstack([random / np.linalg.norm(random, axis=1, keepdims=True), np.eye(3), -np.eye(3)])
 
 
-def dome(colour) -> mp.Mesh:
-    """A ball around CENTRE, of vertices coloured by their direction from it."""
+def dome(color) -> mp.Mesh:
+    """A ball around CENTRE, of vertices colored by their direction from it."""
     ball = mp.builtin_mesh("sphere", triangles=81_920)
     return mp.Mesh(
-        5 * ball.vertices + CENTRE, ball.faces, colors=colour(ball.vertices), materials=mp.Material((1, 1, 1))
+        5 * ball.vertices + CENTRE, ball.faces, colors=color(ball.vertices), materials=mp.Material((1, 1, 1))
     )
 
 
@@ -115,8 +115,8 @@ def test_kernels_look_up_too(maps):
     for size in (16, 64):
         for count in (1, 7, 3000):
             d = directions(count, seed=count)[:count]
-            colour = kernel(types().Array3f(d.T.astype(np.float32)), maps[size].on_device)
-            assert np.allclose(np.array(colour).T, maps[size].lookup(d), atol=1e-6)
+            color = kernel(types().Array3f(d.T.astype(np.float32)), maps[size].on_device)
+            assert np.allclose(np.array(color).T, maps[size].lookup(d), atol=1e-6)
     assert dr.width(maps[16].on_device.texels) == 2 * 16 * 16 * 3
 
 

@@ -3,7 +3,7 @@
 import drjit as dr
 import numpy as np
 import pytest
-from catalogue import NAMES, cameras, soup
+from catalog import NAMES, cameras, soup
 
 import mpcam as mp
 from mpcam.effects.occlusion import facing

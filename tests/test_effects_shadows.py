@@ -143,11 +143,11 @@ def test_the_shadow_of_a_tile_is_where_it_belongs(kind, scale, shift):
     rng = np.random.default_rng(7)
     points = np.concatenate([rng.uniform(-1.9, 1.9, (20_000, 2)), np.zeros((20_000, 1))], axis=1)
     if kind == "sun":
-        light, centre, half, texel = mp.DirectionalLight((0.3, -0.2, -1)), np.array([0.3, -0.2]), 0.5, 4.3 / (size - 4)
+        light, center, half, texel = mp.DirectionalLight((0.3, -0.2, -1)), np.array([0.3, -0.2]), 0.5, 4.3 / (size - 4)
     else:  # twice as high as the tile: a shadow twice as large, of texels seen from the front view's side
         light = mp.PointLight(matrix[:3, :3] @ (0, 0, 2) + matrix[:3, 3])
-        centre, half, texel = np.zeros(2), 1.0, 3.5 * 2 / (0.5 * size - 2)
-    inside = half - np.abs(points[:, :2] - centre).max(-1)
+        center, half, texel = np.zeros(2), 1.0, 3.5 * 2 / (0.5 * size - 2)
+    inside = half - np.abs(points[:, :2] - center).max(-1)
     world = points @ matrix[:3, :3].T + matrix[:3, 3]
     made = mp.shadow_map(floor_and_tile(matrix), light, size)
     found = made.visible(world, np.broadcast_to((0, 0, 1), points.shape))

@@ -62,7 +62,7 @@ def test_obj_with_separate_indices(tmp_path):
     assert len(mesh.vertices) < 9
 
 
-def test_obj_materials_textures_and_colours(tmp_path):
+def test_obj_materials_textures_and_colors(tmp_path):
     (tmp_path / "wood grain.png").write_bytes(png([[188, 0, 99], [255, 255, 255]], [[0, 0, 0], [0, 99, 0]]))
     (tmp_path / "a.mtl").write_text(
         "newmtl plain\nKd 0.25 0.5 0.75\nnewmtl wood\nKd 0 0 0\nmap_Kd -s 1 1 1 -clamp on wood grain.png\n"
@@ -124,7 +124,7 @@ end_header
 """
 
 
-def test_ply_polygons_colours_and_normals(tmp_path):
+def test_ply_polygons_colors_and_normals(tmp_path):
     file = tmp_path / "a.ply"
     file.write_text(PLY)
     mesh = load_mesh(file)
@@ -174,7 +174,7 @@ def test_stl_keeps_every_face(tmp_path):
 
 
 def gltf(image: bytes) -> tuple[dict, bytes]:
-    """One triangle with uv, colours and a texture, placed twice: moved, and mirrored."""
+    """One triangle with uv, colors and a texture, placed twice: moved, and mirrored."""
     positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     uv = np.array([[0, 0], [1, 0], [0, 0.25]], np.float32)
     colors = np.array([[255, 0, 0, 255], [0, 51, 0, 255], [0, 0, 255, 255]], np.uint8)
@@ -229,7 +229,7 @@ def glb(header: dict, data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["gltf", "glb"])
-def test_gltf_nodes_materials_colours(tmp_path, kind):
+def test_gltf_nodes_materials_colors(tmp_path, kind):
     header, data = gltf(png([[188, 0, 99], [255, 255, 255]]))
     file = tmp_path / f"a.{kind}"
     if kind == "glb":

@@ -85,7 +85,7 @@ def test_depth_is_not_taken_for_z_depth(tmp_path):
     file.close()
 
 
-def test_half_is_for_colours_only(tmp_path):
+def test_half_is_for_colors_only(tmp_path):
     image, depth = random_image(4, 5, 4), random_image(4, 5)
     write_image(tmp_path / "a.exr", image, depth=depth, half=True)
     back = read_channels(tmp_path / "a.exr")
@@ -94,7 +94,7 @@ def test_half_is_for_colours_only(tmp_path):
     assert np.array_equal(back[DEPTH_CHANNEL], depth)
 
 
-def test_colours_are_read_by_name_not_by_place(tmp_path):
+def test_colors_are_read_by_name_not_by_place(tmp_path):
     spec = oiio.ImageSpec(2, 1, 4, "float")
     spec.channelnames = ("B", "A", "R", "G")
     write_raw(tmp_path / "a.exr", spec, np.array([[[0.3, 1.0, 0.1, 0.2], [3, 1, 1, 2]]], np.float32))
@@ -210,7 +210,7 @@ def test_png_alpha_is_stored_apart_and_comes_back_multiplied(tmp_path):
     assert np.array_equal(back[0, 2], [0, 0, 0, 0])
 
 
-def test_grey_with_alpha_reads_as_rgba(tmp_path):
+def test_gray_with_alpha_reads_as_rgba(tmp_path):
     from PIL import Image
 
     Image.fromarray(np.array([[[188, 255]]], np.uint8), "LA").save(tmp_path / "a.png")
@@ -301,7 +301,7 @@ BAD_WRITES = [
     ("a.exr", IMAGE, {"channels": {"id": np.zeros((4, 5))}}, r"id has shape \(4, 5\)"),
     ("a.exr", IMAGE, {"channels": {"id": np.full((4, 6), 2**24 + 1)}}, r"id has integers beyond 2\*\*24"),
     ("a.exr", IMAGE, {"channels": {"id": np.full((4, 6), 1j)}}, "id has type complex128"),
-    ("a.exr", IMAGE, {"channels": {"R": np.zeros((4, 6))}}, "'R' is kept for the image's own colours"),
+    ("a.exr", IMAGE, {"channels": {"R": np.zeros((4, 6))}}, "'R' is kept for the image's own colors"),
     ("a.exr", IMAGE, {"channels": {"": np.zeros((4, 6))}}, "channel name '': give 1 to 255 printable characters"),
     ("a.exr", IMAGE, {"channels": {"a\0b": np.zeros((4, 6))}}, r"channel name 'a\\x00b'"),
     ("a.exr", IMAGE, {"channels": [np.zeros((4, 6))]}, "channels is a list: give a dict"),

@@ -28,7 +28,7 @@ def scene(tmp_path):
     (tmp_path / "bare.obj").write_text(TRIANGLE + "f 1 2 3\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "textured.obj").write_text(TRIANGLE + "f 1/1 2/2 3/3\n")
-    write_image(tmp_path / "grey.png", np.full((2, 2), 0.5))
+    write_image(tmp_path / "gray.png", np.full((2, 2), 0.5))
 
     def load(text):
         (tmp_path / "scene.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -142,7 +142,7 @@ translate = [10, 0, 1]
 
 
 def test_texture_is_linear_and_replaces_materials(scene):
-    text = '[[mesh]]\nfile = "sub/textured.obj"\ntexture = "grey.png"\n'
+    text = '[[mesh]]\nfile = "sub/textured.obj"\ntexture = "gray.png"\n'
     (material,) = scene(text).scene.meshes[0].materials
     assert material.texture is not None
     assert material.texture.shape == (2, 2, 3)
@@ -298,7 +298,7 @@ MISTAKES = [
         r"3: mesh\[0\]\.rotate\.axis = \[0, 0, 0\]: give a direction",
     ),
     (MESH + "color = [1, -1, 0]", r"3: mesh\[0\]\.color = \[1, -1, 0\]: give linear RGB numbers that are not negative"),
-    ('[[mesh]]\nfile = "bare.obj"\ntexture = "grey.png"', r"3: mesh\[0\]\.texture = .*no texture coordinates"),
+    ('[[mesh]]\nfile = "bare.obj"\ntexture = "gray.png"', r"3: mesh\[0\]\.texture = .*no texture coordinates"),
     ('[[mesh]]\nfile = "sub/textured.obj"\ntexture = "none.png"', r"3: mesh\[0\]\.texture = .*there is no such file"),
     ('[[mesh]]\nfile = "sub/textured.obj"\ntexture = "bare.obj"', r"3: mesh\[0\]\.texture = .*not an image"),
     ("ambient = -1\n" + MESH, "1: ambient = -1: give linear RGB numbers that are not negative"),

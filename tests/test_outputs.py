@@ -3,7 +3,7 @@
 import drjit as dr
 import numpy as np
 import pytest
-from catalogue import cameras
+from catalog import cameras
 
 import mpcam as mp
 
@@ -114,7 +114,7 @@ def test_shading_is_no_part_of_a_depth_map(scene, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"output": "colour"}, "output='colour': allowed are hits, depth, coverage"),
+        ({"output": "color"}, "output='color': allowed are hits, depth, coverage"),
         ({"output": "depth", "method": "raytrace"}, "output='hits' only"),
         ({"cull": "left"}, "cull='left': allowed are none, back, front"),
         ({"cull": "back", "method": "vertex"}, "has no setting 'cull'"),

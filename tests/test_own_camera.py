@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from catalogue import POSE
+from catalog import POSE
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_json
@@ -25,7 +25,7 @@ LINE = re.findall(r"^    (from mpcam.cameras.pushbroom import .*)$", PAGE, re.MU
 PROGRAM = """
 import inspect, pathlib, sys
 import kit, mpcam as mp
-from catalogue import POSE, registered
+from catalog import POSE, registered
 
 assert inspect.getfile(mp.Pushbroom) == str(pathlib.Path("mpcam/cameras/pushbroom.py").resolve())
 assert "Pushbroom" in dir(mp) and "Pushbroom" in mp.__all__

@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
-from catalogue import soup
+from catalog import soup
 
 import mpcam as mp
 from mpcam.rendering.registry import METHODS
@@ -32,7 +32,7 @@ def meshes():
 
 
 def test_every_pixel_of_a_closed_room_is_hit():
-    """Neighbouring triangles leave no gap: inside a closed box, nothing is missed."""
+    """Neighboring triangles leave no gap: inside a closed box, nothing is missed."""
     rng = np.random.default_rng(5)
     mesh = mp.builtin_mesh("sphere", triangles=1280)
     for target in rng.normal(size=(6, 3)):
@@ -45,8 +45,8 @@ def test_every_pixel_of_a_closed_room_is_hit():
             assert np.array_equal(hits.mask, camera.ray(np.stack([u, v], -1)).valid)
 
 
-def test_edges_through_pixel_centres_leave_no_gap():
-    """Edges and corners exactly on pixel centres, also between meshes that repeat their vertices."""
+def test_edges_through_pixel_centers_leave_no_gap():
+    """Edges and corners exactly on pixel centers, also between meshes that repeat their vertices."""
     k = np.arange(-4, 5) / 8.0
     corners = np.array([[x, y, 1.0] for y in k for x in k])
     number = np.arange(81).reshape(9, 9)
@@ -232,7 +232,7 @@ def test_one_pixel(method):
         (lambda c, m: mp.rasterize(c, m, method="raytrace", level=2), "allowed are none"),
         (lambda c, m: mp.rasterize(c, m, method="vertex", level=1.5), "whole number from 0 to 7"),
         (lambda c, m: mp.rasterize(c, m, method="cubemap", resolution=0), "pixels from 1 to 16384"),
-        (lambda c, m: mp.rasterize(mp.Orthographic(8, 8), m, method="cubemap"), "one centre, not Orthographic"),
+        (lambda c, m: mp.rasterize(mp.Orthographic(8, 8), m, method="cubemap"), "one center, not Orthographic"),
         (lambda c, m: mp.rasterize(mp.Radial.equidistant(8, 8, fov=4.0), m, method="hemicube"), "use method='cubemap'"),
         (lambda c, m: mp.rasterize("camera", m), "camera is a str"),
         (lambda c, m: mp.rasterize(c, "mesh"), "a str is not a scene: give a Scene, a Mesh"),

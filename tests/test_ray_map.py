@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from catalogue import POSE, registered, soup
+from catalog import POSE, registered, soup
 from ray_fields import wrong_pixels
 
 import mpcam as mp

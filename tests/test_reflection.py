@@ -180,7 +180,7 @@ def test_mistakes_are_told():
         ({"level": 1}, "level= goes with method='vertex'"),
         ({"method": "vertex", "level": 9}, "from 0 to 7"),
         ({"triangles": 0}, "from 1 to"),
-        ({"camera": mp.Orthographic(8, 8)}, "common centre"),
+        ({"camera": mp.Orthographic(8, 8)}, "common center"),
         ({"mirror": WAVE}, "give mpcam.Mirror"),
         ({"shading": "shiny"}, "allowed are"),
     ):

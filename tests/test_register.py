@@ -2,7 +2,7 @@
 
 import kit
 import pytest
-from catalogue import POSE, own, registered
+from catalog import POSE, own, registered
 
 REGISTERED = registered(64, 48, POSE)
 CASES = [

@@ -101,12 +101,12 @@ def test_the_theme_button_switches_and_is_remembered(open_page):
     page = open_page()
     color = "getComputedStyle(document.body).backgroundColor"
     light = page.evaluate(color)
-    page.get_by_role("button", name="Switch to dark colours").click()
+    page.get_by_role("button", name="Switch to dark colors").click()
     dark = page.evaluate(color)
     assert dark != light
     page.reload()
     assert page.evaluate(color) == dark
-    page.get_by_role("button", name="Switch to light colours").click()
+    page.get_by_role("button", name="Switch to light colors").click()
     assert page.evaluate(color) == light
 
 

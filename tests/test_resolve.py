@@ -23,8 +23,8 @@ def rays(cams):
     return cams.ray(np.stack([u + 0.5, v + 0.5], axis=-1))
 
 
-def coloured(cams) -> np.ndarray:
-    """Each texel has its ray's direction as its colour; the gutter holds NaN."""
+def colored(cams) -> np.ndarray:
+    """Each texel has its ray's direction as its color; the gutter holds NaN."""
     found = rays(cams)
     return np.where(found.valid[..., None], found.direction, np.nan)
 
@@ -35,7 +35,7 @@ def test_directions_converge_to_those_of_the_mirror(name):
     for triangles, side in ((104, 16), (416, 16)):
         cams = decompose(SHAPES[name], eye, triangles, resolution=side)
         one = Resolver(cams, SHAPES[name], eye)
-        picture = one(coloured(cams))
+        picture = one(colored(cams))
         assert np.isfinite(picture).all()
         errors.append(np.sqrt((np.linalg.norm(picture - one.direction, axis=-1)[one.mask] ** 2).mean()))
     assert errors[1] < 0.4 * errors[0]
@@ -60,7 +60,7 @@ def test_true_directions_are_those_of_a_sphere():
     assert (one.direction[~one.mask] == 0).all() and (one.triangle[~one.mask] == -1).all()
 
 
-def test_linear_colours_are_met_exactly():
+def test_linear_colors_are_met_exactly():
     """Weights of the corners are linear over each triangle: both rules of interpolation give them back."""
     eye = camera(64)
     cams = decompose(SHAPES["sphere"], eye, 26, resolution=7)
@@ -129,7 +129,7 @@ def test_channels_backgrounds_and_repeated_frames():
 def test_other_cameras_at_the_same_eye():
     """A fisheye and a pinhole at one point see the same reflections."""
     cams = decompose(SHAPES["sphere"], EYE, 416, resolution=16)
-    image = coloured(cams)
+    image = colored(cams)
     pose = mp.look_at(EYE, (0, 0, 0))
     for eye in (mp.Radial.equidistant(80, 80, camera_from_world=pose), camera(80, 0.8)):
         one = Resolver(cams, SHAPES["sphere"], eye)
@@ -143,10 +143,10 @@ def test_direct_and_refracting_camera_triangles():
     direct = directions_at_vertices(cams)
     one, other = Resolver(cams, SHAPES["bowl"], eye), Resolver(direct, SHAPES["bowl"], eye)
     assert np.array_equal(one.triangle, other.triangle)
-    assert np.percentile(np.abs(other(coloured(direct)) - other.direction)[other.mask], 99) < 5e-3
+    assert np.percentile(np.abs(other(colored(direct)) - other.direction)[other.mask], 99) < 5e-3
     glass = decompose(SHAPES["sphere"], eye, 200, resolution=16, index=1.5)
     lens = Resolver(glass, SHAPES["sphere"], eye)
-    assert np.percentile(np.linalg.norm(lens(coloured(glass)) - lens.direction, axis=-1)[lens.mask], 95) < 0.02
+    assert np.percentile(np.linalg.norm(lens(colored(glass)) - lens.direction, axis=-1)[lens.mask], 95) < 0.02
 
 
 def test_a_camera_that_does_not_see_the_reflector_has_the_background():
@@ -154,7 +154,7 @@ def test_a_camera_that_does_not_see_the_reflector_has_the_background():
     away = mp.Pinhole(16, 16, 16, 16, 8, 8, camera_from_world=mp.look_at(EYE, 2 * EYE))
     one = Resolver(cams, SHAPES["sphere"], away)
     assert not one.mask.any()
-    assert (one(coloured(cams), 0.5) == 0.5).all()
+    assert (one(colored(cams), 0.5) == 0.5).all()
 
 
 def test_what_cannot_be_resolved_is_refused():
@@ -167,7 +167,7 @@ def test_what_cannot_be_resolved_is_refused():
         ((cams, image, "ball", eye), "Mesh or a Surface"),
         ((cams, image, SHAPES["sphere"], "eye"), "cameras"),
         ((cams, image, SHAPES["sphere"], elsewhere), "decompose anew"),
-        ((cams, image, SHAPES["sphere"], mp.Orthographic(8, 8, 4.0)), "no common centre"),
+        ((cams, image, SHAPES["sphere"], mp.Orthographic(8, 8, 4.0)), "no common center"),
         ((cams, image[1:], SHAPES["sphere"], eye), "atlas image has shape"),
         ((cams, image[..., 0], SHAPES["sphere"], eye), "atlas image has shape"),
         ((cams, "image", SHAPES["sphere"], eye), "numbers"),

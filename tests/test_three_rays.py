@@ -158,16 +158,16 @@ def test_closed_forms():
     up = np.array([[0.0, 0, 2]] * 3)
     assert np.allclose(only(project(CORNERS, up, np.array([0.2, 0.3, 3.0]))), [0.5, 0.2, 1.5])
     assert np.allclose(only(project(CORNERS, up * [[1], [2], [4]], np.array([0.2, 0.3, 3.0]))), [0.5, 0.2, 3 / 4.2])
-    centre = np.array([0.25, 0.25, -1.0])
-    seen = np.array([0.3, 0.2, 0.0]) * 3 - 2 * centre
-    assert np.allclose(only(project(CORNERS, CORNERS - centre, seen)), [0.5, 0.3, 2])
+    center = np.array([0.25, 0.25, -1.0])
+    seen = np.array([0.3, 0.2, 0.0]) * 3 - 2 * center
+    assert np.allclose(only(project(CORNERS, CORNERS - center, seen)), [0.5, 0.3, 2])
     assert not any(image.valid for image in project(CORNERS, up, np.array([0.2, 0.3, -3.0])))
     assert not any(image.valid for image in project(CORNERS, up, np.array([0.9, 0.3, 1.0])))
     assert np.allclose(only(project(CORNERS, up, np.array([0.2, 0.3, 0.0]))), [0.5, 0.2, 0])
     flat = np.array([[1.0, 0, 0], [0, 1, 0], [1, 1, 0]])
     assert not any(image.valid for image in project(CORNERS, flat, np.array([0.2, 0.3, 1.0])))
     assert not any(image.valid for image in project(CORNERS, flat, np.array([0.2, 0.3, 0.0])))
-    assert not any(image.valid for image in project(CORNERS, centre - CORNERS, centre))
+    assert not any(image.valid for image in project(CORNERS, center - CORNERS, center))
 
 
 def test_shared_corners_and_edges_belong_to_both():

@@ -27,7 +27,7 @@ def test_sensor_traces_the_rays_of_camera_triangles(name):
     camera = CAMERAS[name]()
     mesh = around(camera, 150, 0.8)
     hits = mp.rasterize(camera, mesh)
-    image = depth_image(mp.truth.sensor(camera, 1, centred=True), mesh)
+    image = depth_image(mp.truth.sensor(camera, 1, centered=True), mesh)
     # At the edges of triangles either answer is right in float32.
     assert ((image > 0) != hits.mask).sum() <= 3
     both = hits.mask & (image > 0)
@@ -71,7 +71,7 @@ def test_ray_differentials_are_a_step_of_one_pixel():
 
 def test_pixels_outside_of_the_view_are_black():
     camera = mp.Radial.paraboloid(64, 64)
-    scene = {"type": "scene", "light": {"type": "constant"}, "sensor": mp.truth.sensor(camera, 1, centred=True)}
+    scene = {"type": "scene", "light": {"type": "constant"}, "sensor": mp.truth.sensor(camera, 1, centered=True)}
     image = np.array(mi.render(mi.load_dict(scene | {"integrator": {"type": "direct"}}), spp=1)).sum(-1)
     u, v = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5)
     assert np.array_equal(image > 0, camera.ray(np.stack([u, v], -1)).valid)
@@ -140,7 +140,7 @@ def test_shading_is_mitsubas_direct_light(smooth):
                 "position": eye.tolist(),
                 "intensity": {"type": "rgb", "value": [3 * np.pi, 2 * np.pi, np.pi]},
             },
-            "sensor": mp.truth.sensor(camera, 256, centred=True),
+            "sensor": mp.truth.sensor(camera, 256, centered=True),
         }
     )
     # The integrator picks one of the two lights at random: the mean over samples converges to their sum.

@@ -106,16 +106,16 @@ def test_walks_with_one_prepared_frame_and_frozen_panorama(scene):
         hits = prepared.frame()
         fresh = mp.rasterize(here, scene)
         assert np.array_equal(hits.triangle, fresh.triangle)
-        colour = panorama.on_device(shade_device(hits, scene))
+        color = panorama.on_device(shade_device(hits, scene))
         wanted = panorama(mp.shade(hits, scene))
-        assert np.array_equal(np.stack([part.numpy() for part in colour], -1).reshape(wanted.shape), wanted)
+        assert np.array_equal(np.stack([part.numpy() for part in color], -1).reshape(wanted.shape), wanted)
         assert np.array_equal(panorama.on_device(hits.device_triangle).numpy(), panorama(hits.triangle).ravel())
 
 
 @pytest.mark.parametrize(
     ("settings", "word"),
     [
-        ({"centre": (0, 0)}, "centre"),
+        ({"center": (0, 0)}, "center"),
         ({"radius": 0}, "radius"),
         ({"height": np.nan}, "height"),
         ({"columns": 2}, "columns"),
@@ -129,7 +129,7 @@ def test_walks_with_one_prepared_frame_and_frozen_panorama(scene):
 )
 def test_mistakes_are_told(settings, word):
     with pytest.raises(mp.InputError, match=word):
-        surround(**{"centre": (0, 0, 0), **settings})
+        surround(**{"center": (0, 0, 0), **settings})
 
 
 def test_other_cameras_and_images_are_refused():

@@ -54,8 +54,8 @@ CAMERAS = {
 }
 
 
-def centres(camera: mp.Camera) -> np.ndarray:
-    """(H, W, 2) pixel centres of an image."""
+def centers(camera: mp.Camera) -> np.ndarray:
+    """(H, W, 2) pixel centers of an image."""
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     return np.stack([u, v], -1)
 
@@ -63,9 +63,9 @@ def centres(camera: mp.Camera) -> np.ndarray:
 def around(camera: mp.CameraTriangles, count: int, size: float = 1.0, seed: int = 0) -> mp.Mesh:
     """Random triangles, most of them on rays of the camera, some behind it."""
     rng = np.random.default_rng(seed)
-    ray = camera.ray(centres(camera))
+    ray = camera.ray(centers(camera))
     chosen = rng.choice(np.flatnonzero(ray.valid), count)
     along = rng.uniform(-0.5, 4, (count, 1))
-    centre = ray.origin.reshape(-1, 3)[chosen] + along * ray.direction.reshape(-1, 3)[chosen]
-    corners = centre[:, None] + size * rng.normal(size=(count, 3, 3))
+    center = ray.origin.reshape(-1, 3)[chosen] + along * ray.direction.reshape(-1, 3)[chosen]
+    corners = center[:, None] + size * rng.normal(size=(count, 3, 3))
     return mp.Mesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))

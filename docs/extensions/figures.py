@@ -17,7 +17,7 @@ WIDTH = 7.3  # inches; text of 9 points then has its size in the column of a wid
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of a figure: text, weak text, lines of a grid, page, and a palette that colour-blind readers can tell."""
+    """Colors of a figure: text, weak text, lines of a grid, page, and a palette that color-blind readers can tell."""
 
     name: str
     text: str

@@ -1,4 +1,4 @@
-"""How matplotlib draws in the gallery: colours that do on light and on dark pages alike, no background."""
+"""How matplotlib draws in the gallery: colors that do on light and on dark pages alike, no background."""
 
 from typing import Any
 

@@ -30,14 +30,14 @@ def pictures():
     once, twice = behind, behind
     for one, other in ((LEFT, RIGHT), (RIGHT, LEFT)):
         cams = decompose(one, camera, 400)
-        grey = mp.Scene((*scene.meshes, other.mesh(5_000)), None, scene.lights, scene.ambient, scene.background)
+        gray = mp.Scene((*scene.meshes, other.mesh(5_000)), None, scene.lights, scene.ambient, scene.background)
         resolve = Resolver(cams, one, camera)
-        first = mp.render(cams, grey)
+        first = mp.render(cams, gray)
         chain = chained(cams, other, reflector=one)
         second = mp.render(chain.camera, scene)
         nearer = mp.depth_map(cams, scene).depth
         once, twice = resolve(first, once), resolve(chain.combined(first, second, nearer), twice)
-    found["One bounce: the other ball is grey"], found["Two bounces"] = once, twice
+    found["One bounce: the other ball is gray"], found["Two bounces"] = once, twice
     cams = decompose(BALL, camera, 400, index=1.5)
     chain = chained(cams, BALL, 1 / 1.5, reflector=BALL)
     inside = chain.combined(np.zeros((cams.height, cams.width, 3)), mp.render(chain.camera, scene))

@@ -20,7 +20,7 @@ print(image.shape, image.dtype)
 
 # %%
 # `render` is two steps in one. `rasterize` finds the first hit of every pixel's ray:
-# which triangle, how far away, where on it. `shade` turns hits into colours;
+# which triangle, how far away, where on it. `shade` turns hits into colors;
 # `interpolate` gives any other attribute of the mesh at the hits, here the position.
 hits = mp.rasterize(camera, scene.mesh)
 normals = mp.shade(hits, scene, shading="normal")
@@ -51,7 +51,7 @@ axes[1].imshow(picture(normals))
 axes[1].set_title('shading="normal"')
 depth = np.where(hits.mask, hits.depth, np.nan)
 shown = axes[2].imshow(depth, vmax=15)
-axes[2].set_title("depth, metres")
+axes[2].set_title("depth, meters")
 figure.colorbar(shown, ax=axes[2], fraction=0.045)
 for one in axes:
     one.set_axis_off()

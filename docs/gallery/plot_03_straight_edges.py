@@ -16,14 +16,14 @@ scene = mp.builtin_scene("temple", SIZE, SIZE)
 camera = scene.camera
 
 v, u = np.indices((SIZE, SIZE)) + 0.5
-centres = np.stack([u, v], -1)
-seen = camera.ray(centres).valid
+centers = np.stack([u, v], -1)
+seen = camera.ray(centers).valid
 
 
 def projection_error(hits):
-    """Pixels from each centre to the exact image of the point that is shown there."""
+    """Pixels from each center to the exact image of the point that is shown there."""
     image = camera.project(hits.points)
-    distance = np.linalg.norm(image.pixel[..., 0, :] - centres, axis=-1)
+    distance = np.linalg.norm(image.pixel[..., 0, :] - centers, axis=-1)
     return np.where(hits.mask & image.valid[..., 0], distance, np.nan)
 
 

@@ -18,7 +18,7 @@ camera = mp.Radial.equidistant(SIZE, SIZE, pose, fov=np.radians(270))
 print(camera.domain)
 
 # %%
-# What lies behind the camera has an image too: project a point half a metre behind it.
+# What lies behind the camera has an image too: project a point half a meter behind it.
 behind = camera.eye - 0.5 * camera.ray([SIZE / 2, SIZE / 2]).direction
 above = behind + [0, 0, 1.0]
 image = camera.project([behind, above])

@@ -31,7 +31,7 @@ for name, function in profiles.items():
 
 # %%
 # The slope and the inverse of f are found numerically where they are not given.
-# `convex` tells whether the images of straight lines bulge away from the centre
+# `convex` tells whether the images of straight lines bulge away from the center
 # everywhere: then tangents bound them tightly, else wider annular sectors do. The hits
 # are exact in both cases; only the number of tests differs.
 v, u = np.indices((SIZE, SIZE)) + 0.5
@@ -39,8 +39,8 @@ figure, axes = plt.subplots(1, 3, figsize=(7.6, 2.8))
 for one, (name, camera) in zip(axes, cameras.items(), strict=True):
     hits = mp.rasterize(camera, scene.mesh)
     image = camera.project(hits.points[hits.mask])
-    centres = np.stack([u, v], -1)[hits.mask]
-    error = np.linalg.norm(image.pixel[:, 0] - centres, axis=-1)
+    centers = np.stack([u, v], -1)[hits.mask]
+    error = np.linalg.norm(image.pixel[:, 0] - centers, axis=-1)
     print(
         f"{name:15s} convex {camera.profile.convex!s:5s}",
         f"tests per hit {hits.stats.overdraw:6.2f}",

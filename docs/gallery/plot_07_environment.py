@@ -30,7 +30,7 @@ difference = np.abs(around.lookup(ray.direction) - direct)[ray.valid].max(-1)
 print(f"half of the pixels differ by less than {np.median(difference):.4f}")
 
 # %%
-# A mirror ball at that point, seen from two metres away: the view direction reflected
+# A mirror ball at that point, seen from two meters away: the view direction reflected
 # about the normal is where to look. Past the ball, the same map serves as the backdrop.
 ball = mp.builtin_mesh("sphere", triangles=20_480)
 eye = np.array([-2.6, -1.9, 0.3])

@@ -31,7 +31,7 @@ for size in sizes:
 
 # %%
 # Ambient occlusion is the rest: 1 under a free sky, 0 in a closed box. Here it is worked
-# out at the vertices, once for each weight, and becomes a vertex colour. Elements are
+# out at the vertices, once for each weight, and becomes a vertex color. Elements are
 # moved off the surface by 1e-5 of the mesh's size, so as not to see their own face.
 floor = mp.builtin_mesh("plane", triangles=2 * 40**2).transformed(np.diag([3, 3, 1, 1]))
 box = mp.builtin_mesh("cube", triangles=12 * 6**2).flat()
@@ -58,14 +58,14 @@ pose = mp.look_at((-0.5, -1.9, 1.0), (0, 0, 0.2))
 camera = mp.Radial.equidistant(420, 420, pose, fov=1.5, radius=300)
 figure, axes = plt.subplots(1, 3, figsize=(7.6, 2.6))
 for one, (weight, open_share) in zip(axes, baked.items(), strict=False):
-    coloured = mp.Mesh(
+    colored = mp.Mesh(
         mesh.vertices,
         mesh.faces,
         colors=np.repeat(open_share[:, None], 3, axis=1),
         materials=mp.Material((1, 1, 1)),
     )
-    image = mp.render(camera, coloured, shading="color")
-    seen = mp.rasterize(camera, coloured).mask
+    image = mp.render(camera, colored, shading="color")
+    seen = mp.rasterize(camera, colored).mask
     one.imshow(np.dstack([np.clip(image, 0, 1), seen]))
     one.set_title(f'weight="{weight}"')
     one.set_axis_off()

@@ -33,7 +33,7 @@ RAYS = {"central": central_rays, "general": general_rays}
 
 @dataclass(frozen=True)
 class Task:
-    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle, neighbours close together; names: the
+    """What is drawn. vertices: 3 numbers each; faces: 3 UInts per triangle, neighbors close together; names: the
     triangles' own numbers; counts: triangles, then clusters level by level; pose: twelve numbers that bring vertices to
     the frame of the rays; rays: the blocks.
     """

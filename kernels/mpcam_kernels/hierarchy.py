@@ -47,18 +47,18 @@ def every_pair(thread: Any, count: int) -> tuple[Any, Any]:
 
 
 def triangle_balls(types: Any, points: tuple[Any, Any, Any], usable: Any) -> Any:
-    """Ball around the corners of triangles: centre and radius, radius -1 where unusable."""
+    """Ball around the corners of triangles: center and radius, radius -1 where unusable."""
     a, b, c = points
     low, high = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
-    centre = 0.5 * (low + high)
+    center = 0.5 * (low + high)
     radius = dr.sqrt(
-        dr.maximum(dr.maximum(dr.squared_norm(a - centre), dr.squared_norm(b - centre)), dr.squared_norm(c - centre))
+        dr.maximum(dr.maximum(dr.squared_norm(a - center), dr.squared_norm(b - center)), dr.squared_norm(c - center))
     )
-    return types.Array4f(*dr.select(usable, centre, 0), dr.select(usable, radius, -1.0))
+    return types.Array4f(*dr.select(usable, center, 0), dr.select(usable, radius, -1.0))
 
 
 def cluster_balls(types: Any, cluster: Any, balls: Rows, count: int) -> Any:
-    """Ball around the balls of FAN children with neighbouring numbers, of which there are `count`."""
+    """Ball around the balls of FAN children with neighboring numbers, of which there are `count`."""
 
     def child(k: int) -> tuple[Any, Any]:
         number = cluster * FAN + k
@@ -72,10 +72,10 @@ def cluster_balls(types: Any, cluster: Any, balls: Rows, count: int) -> Any:
         low = dr.select(exists, dr.minimum(low, ball.xyz - ball.w), low)
         high = dr.select(exists, dr.maximum(high, ball.xyz + ball.w), high)
     some = low.x <= high.x
-    centre, radius = dr.select(some, 0.5 * (low + high), 0), types.Float(-1)
+    center, radius = dr.select(some, 0.5 * (low + high), 0), types.Float(-1)
     for ball, exists in children:
-        radius = dr.select(exists, dr.maximum(radius, dr.norm(ball.xyz - centre) + ball.w), radius)
-    return types.Array4f(*centre, radius)
+        radius = dr.select(exists, dr.maximum(radius, dr.norm(ball.xyz - center) + ball.w), radius)
+    return types.Array4f(*center, radius)
 
 
 def meeting(types: Any, cone: Any, balls: Rows, ball: Any, exists: Any, cull: bool) -> Any:

@@ -18,7 +18,7 @@ class PixelTriangle(NamedTuple):
 
 
 def _edge(p: Vector, q: Vector, flip: Any) -> tuple[Vector, Vector]:
-    """The edge from its lexicographically lower end, so that neighbours compute the same numbers."""
+    """The edge from its lexicographically lower end, so that neighbors compute the same numbers."""
     swap = (p.x > q.x) | ((p.x == q.x) & (p.y > q.y))
     low, high = dr.select(swap, q, p), dr.select(swap, p, q)
     return low, dr.select(swap ^ flip, low - high, high - low)
@@ -66,10 +66,10 @@ def weights(triangle: PixelTriangle, pixel: Vector) -> tuple[Float, Float]:
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: PixelTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+def may_hit(triangle: PixelTriangle, center: Vector, right: Vector, down: Vector, spread: Float) -> Any:
     """False only where no pixel of a square (see `samples.Bounds`) is covered."""
     possible = triangle.usable & (spread >= 0)
-    for value, step in zip(_edges(triangle, centre), triangle.steps, strict=True):
+    for value, step in zip(_edges(triangle, center), triangle.steps, strict=True):
         reach = abs(step.x * down.y) + abs(step.y * right.x) + (abs(step.x) + abs(step.y)) * 1e-3
         possible = possible & (value + reach >= 0)
     return possible

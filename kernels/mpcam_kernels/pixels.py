@@ -1,4 +1,4 @@
-"""Pixels through the lists of their blocks: the nearest surface in registers, eight neighbouring pixels a thread."""
+"""Pixels through the lists of their blocks: the nearest surface in registers, eight neighboring pixels a thread."""
 
 import functools
 import operator

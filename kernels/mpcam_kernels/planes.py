@@ -43,7 +43,7 @@ class Items:
 
 
 def outline(types: Any, bound: str, planes: Planes, face: Any, points: list[Any]) -> tuple[regions.Outline, Any]:
-    """The outline of triangles, in pixels of the camera triangle (centre of the first one at 0.5), and its side."""
+    """The outline of triangles, in pixels of the camera triangle (center of the first one at 0.5), and its side."""
     rows = [dr.gather(types.Array4f, row, face) for row in planes.maps]
     places = [[dr.dot(row.xyz, point) + row.w for row in rows] for point in points]
     state = dr.gather(types.Float, planes.state, face)

@@ -33,7 +33,7 @@ class PluckerTriangle(NamedTuple):
 
 
 def _edge(p: Vector, q: Vector) -> tuple[Vector, Vector]:
-    """p x q and q - p, to the bit the negatives of those of the edge from q to p, so that neighbours leave no gap."""
+    """p x q and q - p, to the bit the negatives of those of the edge from q to p, so that neighbors leave no gap."""
     swap = follows(p, q)
     low, high = dr.select(swap, q, p), dr.select(swap, p, q)
     along = high - low

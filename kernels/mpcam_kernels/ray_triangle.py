@@ -25,7 +25,7 @@ def follows(p: Vector, q: Vector) -> Any:
 
 
 def _edge_normal(p: Vector, q: Vector) -> Vector:
-    """p x q, to the bit the negative of q x p, so that neighbours leave no gap between them.
+    """p x q, to the bit the negative of q x p, so that neighbors leave no gap between them.
 
     Written with q - p, which is exact for short edges: the edge is then off by an angle of a few units in the last
     place, however small the triangle is.
@@ -75,13 +75,13 @@ def weights(triangle: RayTriangle, direction: Vector) -> tuple[Float, Float]:
     return e1 * scale, e2 * scale
 
 
-def may_hit(triangle: RayTriangle, centre: Vector, right: Vector, down: Vector, spread: Float) -> Any:
+def may_hit(triangle: RayTriangle, center: Vector, right: Vector, down: Vector, spread: Float) -> Any:
     """False only where no direction of a square (see `samples.Bounds`) hits the triangle."""
     possible = triangle.usable & (spread >= 0)
     for edge in triangle.edges:
         length = dr.sqrt(dr.squared_norm(edge))
         reach = abs(dr.dot(edge, right)) + abs(dr.dot(edge, down)) + length * (spread + 1e-6)
-        possible = possible & (dr.dot(edge, centre) + reach >= 0)
+        possible = possible & (dr.dot(edge, center) + reach >= 0)
     return possible
 
 

@@ -1,6 +1,6 @@
 """Pixel regions that hold the image of a triangle: a box and, where known, three lines around it.
 
-A line (a, b, c) keeps the pixel centres (u, v) with a u + b v + c >= 0; (a, b) has unit length. Along a row of pixels
+A line (a, b, c) keeps the pixel centers (u, v) with a u + b v + c >= 0; (a, b) has unit length. Along a row of pixels
 a region is one span.
 """
 
@@ -76,7 +76,7 @@ def slack(size: Any) -> Any:
 
 
 def _range(types: Any, low: Any, high: Any, size: Any) -> tuple[Any, Any]:
-    """First and one past the last pixel whose centre lies in [low, high]."""
+    """First and one past the last pixel whose center lies in [low, high]."""
     pad, size = slack(size), float(size) if isinstance(size, int) else size
     first = dr.ceil(dr.maximum(low - (0.5 + pad), 0.0))
     last = dr.floor(dr.minimum(high + (0.5 + pad), size))

@@ -20,7 +20,7 @@ NOWHERE = -1e9  # image coordinate that no triangle covers
 
 @dataclass(frozen=True)
 class Samples:
-    """One sample per slot (ray directions or pixel centres), and bounds of the samples of squares of pixels.
+    """One sample per slot (ray directions or pixel centers), and bounds of the samples of squares of pixels.
 
     coarse: bounds of squares of COARSE pixels, row by row; parts: of the parts of the blocks, in the order of slots.
     """
@@ -42,16 +42,16 @@ class Samples:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Samples of squares: centre + s right + t down, s and t from -1 to 1, and no more than `spread` off.
+    """Samples of squares: center + s right + t down, s and t from -1 to 1, and no more than `spread` off.
 
-    rows: arrays of four numbers a square: centre and spread; right; down. Without the last two, they are zero. The
+    rows: arrays of four numbers a square: center and spread; right; down. Without the last two, they are zero. The
     spread is negative where no pixel is valid.
     """
 
     rows: list[Any]
 
     def __call__(self, types: Any, number: Any, active: Any = True) -> tuple[Any, Any, Any, Any]:
-        """Centre, right, down and spread of squares by number."""
+        """Center, right, down and spread of squares by number."""
         first, *tilt = (dr.gather(types.Array4f, row, number, active) for row in self.rows)
         right, down = (row.xyz for row in tilt) if tilt else (types.Array3f(0), types.Array3f(0))
         return first.xyz, right, down, first.w
@@ -93,8 +93,8 @@ def pixel_of(types: Any, index: Any, width: int, height: int) -> tuple[Any, Any,
     return x, y, (x < width) & (y < height)
 
 
-def pixel_centres(types: Any, width: int, height: int) -> Any:
-    """(u, v) of every pixel's centre, row by row; the top left pixel's is (0.5, 0.5)."""
+def pixel_centers(types: Any, width: int, height: int) -> Any:
+    """(u, v) of every pixel's center, row by row; the top left pixel's is (0.5, 0.5)."""
     pixel = dr.arange(types.UInt, width * height)
     return types.Array2f(types.Float(pixel % width) + 0.5, types.Float(pixel // width) + 0.5)
 
@@ -111,7 +111,7 @@ def central_samples(types: Any, direction: Any, valid: Any, width: int, height: 
 
 
 def planar_samples(types: Any, valid: Any, width: int, height: int) -> Samples:
-    """Pixel centres themselves; NOWHERE where a pixel (given row by row) is not valid."""
+    """Pixel centers themselves; NOWHERE where a pixel (given row by row) is not valid."""
     columns, rows = blocks(width, height)
     index = dr.arange(types.UInt, columns * rows * PIXELS)
     x, y, exists = pixel_of(types, index, width, height)
@@ -121,8 +121,8 @@ def planar_samples(types: Any, valid: Any, width: int, height: int) -> Samples:
     squares = []
     for x, y, side, _ in _squares(types, width, height):
         half = 0.5 * (side - 1)
-        centre = types.Array4f(types.Float(x) + 0.5 * side, types.Float(y) + 0.5 * side, 0, 0)
-        squares.append(_flat(centre, types.Array4f(half, 0, 0, 0), types.Array4f(0, half, 0, 0)))
+        center = types.Array4f(types.Float(x) + 0.5 * side, types.Float(y) + 0.5 * side, 0, 0)
+        squares.append(_flat(center, types.Array4f(half, 0, 0, 0), types.Array4f(0, half, 0, 0)))
     return Samples(pixels, *squares)
 
 
@@ -162,24 +162,24 @@ def _bounds(types: Any, pixels: Any, left: Any, top: Any, side: int, width: int)
 
     def tilt(k: Any, right: Any, down: Any) -> Any:
         d, s, t, valid = sample(k)
-        away = dr.select(valid, d - centre, 0)
+        away = dr.select(valid, d - center, 0)
         return k + 1, right + s * away, down + t * away
 
     def widen(k: Any, spread: Any) -> Any:
         d, s, t, valid = sample(k)
-        return k + 1, dr.select(valid, dr.maximum(spread, dr.norm(d - centre - s * right - t * down)), spread)
+        return k + 1, dr.select(valid, dr.maximum(spread, dr.norm(d - center - s * right - t * down)), spread)
 
     def all_samples(k: Any, *_: Any) -> Any:
         return k < many
 
     nothing = dr.zeros(types.Array3f, count)
     _, total, found = dr.while_loop((zero, nothing, types.Float(0)), all_samples, add)
-    centre = total / dr.maximum(found, 1)
+    center = total / dr.maximum(found, 1)
     right, down = nothing, nothing
     if tilted:
         _, right, down = dr.while_loop((zero, nothing, nothing), all_samples, tilt)
         squares = sum((k % side - half) ** 2 for k in range(many)) / half**2
         right, down = right / squares, down / squares
     _, spread = dr.while_loop((zero, dr.full(types.Float, -1.0, count)), all_samples, widen)
-    rows = [types.Array4f(*row, w) for row, w in ((centre, spread), (right, 0), (down, 0))]
+    rows = [types.Array4f(*row, w) for row, w in ((center, spread), (right, 0), (down, 0))]
     return _flat(*(rows if tilted else rows[:1]))

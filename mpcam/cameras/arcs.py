@@ -1,6 +1,6 @@
 """Boxes of curved triangles under radial projections.
 
-An edge of a scene triangle lies in a plane through the centre, so it is a great-circle arc of directions, whose image
+An edge of a scene triangle lies in a plane through the center, so it is a great-circle arc of directions, whose image
 turns one way only (for profiles with `Profile.convex`; the page on rasterization says why). So along each image axis
 an arc has at most one extremum per half turn, and it lies where the slope along the arc changes its sign; between two
 points with tangents, the arc stays inside the triangle of the two points and the crossing of the tangents. Corners of
@@ -149,10 +149,10 @@ def arc_box(camera: RadialCamera, a: Vector, b: Vector) -> Box:
             high[i] = maximum(high[i], where(found, limit, high[i]))
         else:
             low[i] = minimum(low[i], where(found, limit, low[i]))
-    centre = (camera.cx, camera.cy)
+    center = (camera.cx, camera.cy)
     twice = twice | _through_antipode(camera, a[2] * cos(split) + tangent[2] * sin(split))
-    low = [where(twice, centre[i] - camera.radius, low[i]) for i in (0, 1)]
-    high = [where(twice, centre[i] + camera.radius, high[i]) for i in (0, 1)]
+    low = [where(twice, center[i] - camera.radius, low[i]) for i in (0, 1)]
+    high = [where(twice, center[i] + camera.radius, high[i]) for i in (0, 1)]
     return Box(vector(*low), vector(*high), valid)
 
 
@@ -229,13 +229,13 @@ def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box
             low[i] = minimum(low[i], where(arc.valid, arc.low[i], _FAR))
             high[i] = maximum(high[i], where(arc.valid, arc.high[i], -_FAR))
         valid = valid | arc.valid
-        # Opposite corners, or one at the centre: the edge passes through the eye, its arc is undefined.
+        # Opposite corners, or one at the center: the edge passes through the eye, its arc is undefined.
         through_eye = through_eye | (dot(corners[p], corners[q]) < -1 + 1e-6) | (dot(corners[p], corners[p]) < 0.5)
     normals = [cross(corners[(i + 1) % 3], corners[(i + 2) % 3]) for i in range(3)]
     facing = where(dot(corners[0], normals[0]) < 0, -1.0, 1.0)
     area = norm(normals[0]) + norm(normals[1]) + norm(normals[2]) > 0
     z, side = cos(0.5 * camera.fov + 0.0 * facing), sin(0.5 * camera.fov + 0.0 * facing)
-    centre = (camera.cx, camera.cy)
+    center = (camera.cx, camera.cy)
     for i in (0, 1):
         for sign in (-1, 1):
             rim = vector(sign * side * (1 - i), sign * side * i, z)
@@ -243,9 +243,9 @@ def radial_bound(camera: RadialCamera, a: Vector, b: Vector, c: Vector, edge_box
             inside = area & (minimum(minimum(edges[0], edges[1]), edges[2]) >= 0)
             valid = valid | inside
             if sign > 0:
-                high[i] = maximum(high[i], where(inside, centre[i] + camera.radius, -_FAR))
+                high[i] = maximum(high[i], where(inside, center[i] + camera.radius, -_FAR))
             else:
-                low[i] = minimum(low[i], where(inside, centre[i] - camera.radius, _FAR))
+                low[i] = minimum(low[i], where(inside, center[i] - camera.radius, _FAR))
     box = _disc(camera, Box(vector(*low), vector(*high), valid), through_eye)
     return _padded(camera, Box(box.low, box.high, box.valid & finite))
 
@@ -273,7 +273,7 @@ class Cone(NamedTuple):
 
 
 def bounding_cone(corners: list[Vector]) -> Cone:
-    """Cone around the mean of three unit directions; `wide` from 90 degrees, and where a corner is at the centre."""
+    """Cone around the mean of three unit directions; `wide` from 90 degrees, and where a corner is at the center."""
     axis = normalize(vector(*(corners[0][i] + corners[1][i] + corners[2][i] for i in range(3))))
     cosine = minimum(minimum(dot(axis, corners[0]), dot(axis, corners[1])), dot(axis, corners[2]))
     wide = (cosine < 0.01) | (dot(corners[0], corners[0]) < 0.5)
@@ -314,9 +314,9 @@ def sector_bound(camera: RadialCamera, corners: list[Vector]) -> Box:
     scale = camera.pixels_per_radius
     r0, r1 = scale * camera.profile.radius(inner), scale * camera.profile.radius(outer)
     low, high = [], []
-    for centre, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
-        high.append(centre + where(ahead >= 0, r1, r0) * ahead)
-        low.append(centre - where(behind >= 0, r1, r0) * behind)
+    for center, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
+        high.append(center + where(ahead >= 0, r1, r0) * ahead)
+        low.append(center - where(behind >= 0, r1, r0) * behind)
     return _disc(camera, _padded(camera, Box(vector(*low), vector(*high), valid)), cone.wide)
 
 
@@ -338,9 +338,9 @@ def outer_bound(camera: RadialCamera, limit: Array, a: Vector, b: Vector, c: Vec
     inner = where(cone.around, 0.0, minimum(maximum(cone.theta - cone.spread, 0.0), half_fov))
     r0 = camera.pixels_per_radius * camera.profile.radius(inner)
     low, high = [], []
-    for centre, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
-        high.append(where(cone.wide | (ahead > -1e-6), _FAR, centre + r0 * ahead))
-        low.append(where(cone.wide | (behind > -1e-6), -_FAR, centre - r0 * behind))
+    for center, (ahead, behind) in zip((camera.cx, camera.cy), _nearest(cone), strict=True):
+        high.append(where(cone.wide | (ahead > -1e-6), _FAR, center + r0 * ahead))
+        low.append(where(cone.wide | (behind > -1e-6), -_FAR, center - r0 * behind))
     return _padded(camera, Box(vector(*low), vector(*high), finite & reached & (limit > half_fov)))
 
 

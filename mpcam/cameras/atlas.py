@@ -17,8 +17,8 @@ TOLERANCE = 1e-3
 class Atlas:
     """Image places of camera triangles.
 
-    sides: (F,) pixels along the two short sides of each; corners 1, 2 and 3 of a camera triangle are centres of pixels,
-    so that neighbours share the rays of their common edge. corners: (F, 2) pixel of corner 1. signs: (F,) 1 where
+    sides: (F,) pixels along the two short sides of each; corners 1, 2 and 3 of a camera triangle are centers of pixels,
+    so that neighbors share the rays of their common edge. corners: (F, 2) pixel of corner 1. signs: (F,) 1 where
     corner 2 lies to the right and corner 3 below, -1 where they lie to the left and above.
     """
 

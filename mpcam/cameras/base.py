@@ -146,14 +146,14 @@ class Camera:
     def local(self, point: Vector) -> Vector:
         """World point to the camera frame, components first.
 
-        A point that rounding cannot tell from the camera's centre becomes the centre: its direction means nothing.
+        A point that rounding cannot tell from the camera's center becomes the center: its direction means nothing.
         """
         turned, shift = rotate(self.camera_from_world, point), translation(self.camera_from_world)
         moved = [turned[i] + shift[i] for i in range(3)]
         doubt = 4 * epsilon(moved[0])
         lost = [abs(moved[i]) <= doubt * (abs(turned[i]) + abs(shift[i])) for i in range(3)]
-        centre = lost[0] & lost[1] & lost[2] & isfinite(moved[0] + moved[1] + moved[2])
-        return vector(*(where(centre, 0.0, moved[i]) for i in range(3)))
+        center = lost[0] & lost[1] & lost[2] & isfinite(moved[0] + moved[1] + moved[2])
+        return vector(*(where(center, 0.0, moved[i]) for i in range(3)))
 
     def contains(self, pixel: Array) -> Array:
         """Whether pixels (..., 2) lie inside the image rectangle."""

@@ -76,11 +76,11 @@ def _stacked(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector
 
 def _may_pass(rays: list[tuple[Vector, Vector, Array]], q: Vector) -> Array:
     """Whether points lie within the cone around three rays, widened."""
-    centre = sum(ray[0] for ray in rays) / 3.0
+    center = sum(ray[0] for ray in rays) / 3.0
     axis = normalize(sum(ray[1] for ray in rays))
-    reach, spread = (np.max([norm(ray[k] - one) for ray in rays], axis=0) for k, one in ((0, centre), (1, axis)))
+    reach, spread = (np.max([norm(ray[k] - one) for ray in rays], axis=0) for k, one in ((0, center), (1, axis)))
     reach, spread = LOOSE * reach, np.minimum(LOOSE * spread + 0.01, 2.0)
-    away = q - centre
+    away = q - center
     a, b, c = 1.0 - spread**2, dot(away, axis) + reach * spread, dot(away, away) - reach**2
     bent = rays[0][2] & rays[1][2] & rays[2][2]  # where some rays do not pass, the cone means little
     return (c <= 0) | (a <= 0) | ((b > 0) & (b * b >= a * c)) | ~bent
@@ -154,8 +154,8 @@ def _refined(bend: Bend, v: Any, n: Any, q: Vector, second: Array, third: Array,
 def _widened(corners: list[Vector]) -> tuple[Vector, ...]:
     """The corners of the larger triangle, by going on linearly."""
     a, b, c = corners
-    centre = (a + b + c) * (1.0 / 3.0)
-    return tuple(centre + WIDER * (corner - centre) for corner in (a, b, c))
+    center = (a + b + c) * (1.0 / 3.0)
+    return tuple(center + WIDER * (corner - center) for corner in (a, b, c))
 
 
 def _parts() -> list[tuple[tuple[float, float], ...]]:

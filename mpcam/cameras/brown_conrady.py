@@ -8,7 +8,7 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import FARTHEST, described
 from mpcam.cameras.distortion import Distortion, Reach
 from mpcam.cameras.fields import Limits, Number, Positive
-from mpcam.cameras.symmetric import finite_pixel, project_centred
+from mpcam.cameras.symmetric import finite_pixel, project_centered
 from mpcam.cameras.types import Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, absolute, atan, epsilon, library, maximum, normalize, safe_sqrt, vector, where
@@ -26,12 +26,12 @@ class BrownConrady(Camera):
     Conrady 1919 and Brown 1966, with the rational radial term of OpenCV. It is COLMAP's SIMPLE_RADIAL, RADIAL, OPENCV
     and FULL_OPENCV, Kalibr's radtan, and plumb_bob and rational_polynomial of ROS.
 
-    width, height: pixels. fx, fy, cx, cy: focal lengths and principal point, pixels, centre of the top left pixel at
+    width, height: pixels. fx, fy, cx, cy: focal lengths and principal point, pixels, center of the top left pixel at
     (0.5, 0.5). k: up to six numbers k1 to k6, k1 to k3 in the numerator, missing ones 0. (OpenCV's own list is k1, k2,
     p1, p2, k3, ...) p: p1 and p2. camera_from_world: 4x4, OpenCV axes. max_angle: largest angle between a ray and the
     axis, radians; rays reach less than 90 degrees in any case.
 
-    The map folds: past some radius, points come back towards the centre. The domain is the part around the axis where
+    The map folds: past some radius, points come back towards the center. The domain is the part around the axis where
     it has not, found from the coefficients (see `folds`); points and pixels beyond are invalid, and the inverse is
     bracketed there, so it never gives the other side of a fold. Derived, where all parameters are plain numbers: reach.
 
@@ -117,8 +117,8 @@ class BrownConrady(Camera):
         return Ray(vector(zero, zero, zero), normalize(vector(x, y, zero + 1.0)), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """Image of a point in the camera frame; valid in the domain, not at the camera's centre."""
-        return (project_centred(self, point),)
+        """Image of a point in the camera frame; valid in the domain, not at the camera's center."""
+        return (project_centered(self, point),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, and whether it lies in the domain.

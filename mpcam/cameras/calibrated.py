@@ -13,13 +13,13 @@ import numpy as np
 from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_rough
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import Profile, bulges_outward
-from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray, within
+from mpcam.cameras.symmetric import finite_pixel, project_centered, symmetric_image, symmetric_ray, within
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, detach, library, maximum, minimum, vector, where
 
 FARTHEST = 1e6
-"""Images end at so many focal lengths from the centre, where a formula would go on to infinity."""
+"""Images end at so many focal lengths from the center, where a formula would go on to infinity."""
 
 _FAR = 1e9  # pixels; stands for infinity
 _SAMPLES = 2001
@@ -43,7 +43,7 @@ class Calibrated:
 
     Derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
     rim, its radius in focal lengths; edge, an angle beyond which nothing lands in the image; convex, whether images of
-    straight lines bulge away from the centre up to there (see `Profile`). They are None and False in cameras whose
+    straight lines bulge away from the center up to there (see `Profile`). They are None and False in cameras whose
     parameters are traced by JAX.
     """
 
@@ -144,8 +144,8 @@ class Calibrated:
         return symmetric_ray(self._profile(self.angle_limit()), x, y, self._rim(), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """Image of a point in the camera frame; valid in the domain, not at the camera's centre."""
-        return (project_centred(self, point),)
+        """Image of a point in the camera frame; valid in the domain, not at the camera's center."""
+        return (project_centered(self, point),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, and whether it lies in the domain; beyond it, the pixel is on its rim."""
@@ -184,12 +184,12 @@ class Calibrated:
         view = _View(profile, 2.0 * edge, profile.radius(edge))
         inner, outer = bound(view, a, b, c), outer_bound(view, limit, a, b, c)
         low, high = [], []
-        for i, (centre, focal) in enumerate(((self.cx, self.fx), (self.cy, self.fy))):
+        for i, (center, focal) in enumerate(((self.cx, self.fx), (self.cy, self.fy))):
             smallest, largest = where(inner.valid, inner.low[i], _FAR), where(inner.valid, inner.high[i], -_FAR)
             smallest = where(outer.valid, minimum(smallest, outer.low[i]), smallest)
             largest = where(outer.valid, maximum(largest, outer.high[i]), largest)
-            low.append(maximum(minimum(centre + focal * smallest, _FAR), -_FAR))
-            high.append(maximum(minimum(centre + focal * largest, _FAR), -_FAR))
+            low.append(maximum(minimum(center + focal * smallest, _FAR), -_FAR))
+            high.append(maximum(minimum(center + focal * largest, _FAR), -_FAR))
         return Box(vector(*low), vector(*high), inner.valid | outer.valid)
 
     def __repr__(self) -> str:

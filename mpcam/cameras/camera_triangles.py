@@ -29,7 +29,7 @@ class CameraTriangles(Camera):
     camera_from_world says otherwise; scene units, directions and normals of any length but zero. faces (F, 3): vertex
     numbers. resolution: pixels along the short sides of each triangle in the image, one number >= 2 or F of them.
     ray_scale, for directions: "unit" (normalized at the vertices, as the paper has it), "plane" (equal parts along the
-    triangle's normal: then pinholes and general linear cameras are met exactly, but rays of neighbours on a common edge
+    triangle's normal: then pinholes and general linear cameras are met exactly, but rays of neighbors on a common edge
     differ unless the two lie in one plane) or "near_far" (lengths as given: vertices to vertices + directions, the
     continuous three-ray camera). index: None for a mirror, else the refractive index behind the surface over that on
     the eye's side. Raises InputError for shapes that do not fit, and values that are not finite.
@@ -131,7 +131,7 @@ class CameraTriangles(Camera):
 
     @property
     def domain(self) -> Domain:
-        """No common centre, so no largest angle, and no image circle."""
+        """No common center, so no largest angle, and no image circle."""
         return Domain(None, None)
 
     @property

@@ -15,7 +15,7 @@ _CENTER = {"cx": "width", "cy": "height"}
 
 
 def resized(camera: Any, width: int, height: int) -> Any:
-    """The camera with an image of width x height pixels: what filled the shorter side still fills it, centres stay put.
+    """The camera with an image of width x height pixels: what filled the shorter side still fills it, centers stay put.
 
     Panoramas keep their ranges of angles. Raises InputError for sizes below 1 pixel, and for camera models that do not
     say what of them is measured in pixels.

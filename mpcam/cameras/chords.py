@@ -245,10 +245,10 @@ def _piece(camera: RadialCamera, corners: list[Vector], hulls: list[Hull], turn:
         inmost = maximum(inmost, a * camera.cx + b * camera.cy - camera.radius)
         lines.append(vector(a, b, pad - inmost))
     low, high = [], []
-    for i, centre in enumerate((camera.cx, camera.cy)):
+    for i, center in enumerate((camera.cx, camera.cy)):
         least, most = points[0][i], points[0][i]
         for point in points[1:]:
             least, most = minimum(least, point[i]), maximum(most, point[i])
-        low.append(maximum(least, centre - camera.radius) - pad)
-        high.append(minimum(most, centre + camera.radius) + pad)
+        low.append(maximum(least, center - camera.radius) - pad)
+        high.append(minimum(most, center + camera.radius) + pad)
     return Outline(vector(*low), vector(*high), valid, (lines[0], lines[1], lines[2]))

@@ -14,10 +14,10 @@ from mpcam.math import PI, Array, maximum, safe_sqrt, where
 class DoubleSphere(Spheres, Camera):
     """r = rho / (alpha d2 + (1 - alpha) (xi d1 + z)), d1 = norm(x, y, z), d2 = norm(x, y, xi d1 + z), rho = norm(x, y).
 
-    Usenko, Demmel and Cremers 2018, equations 40 to 51. A point lands on a unit sphere, from there, seen from a centre
-    shifted by xi, on a second one, and from there, seen from a centre shifted by alpha / (1 - alpha), in the image.
+    Usenko, Demmel and Cremers 2018, equations 40 to 51. A point lands on a unit sphere, from there, seen from a center
+    shifted by xi, on a second one, and from there, seen from a center shifted by alpha / (1 - alpha), in the image.
 
-    width, height: pixels. fx, fy, cx, cy: pixels, centre of the top left pixel at (0.5, 0.5); at the axis the image has
+    width, height: pixels. fx, fy, cx, cy: pixels, center of the top left pixel at (0.5, 0.5); at the axis the image has
     fx / (1 + xi) pixels per radian. xi: above -1. alpha: 0 to 1. camera_from_world: 4x4, OpenCV axes. max_angle:
     largest angle between a ray and the axis, radians. The domain ends there, or where r stops increasing, whichever
     comes first: on the second sphere that is z2 = -w1 d2, with w1 = alpha / (1 - alpha) or its inverse, whichever is
@@ -25,7 +25,7 @@ class DoubleSphere(Spheres, Camera):
     for xi = -0.5, alpha = 0.1, it takes in points behind the pinhole.)
 
     Derived fields: front = 1 + xi and back = 1 - xi, before xi is rounded to float32: near -1 and 1 the image depends
-    on them. At xi = -1 the axis would have no image, and the image no centre.
+    on them. At xi = -1 the axis would have no image, and the image no center.
 
     Raises InputError for sizes below 1, focal lengths that are not positive, xi and alpha out of range, numbers that
     are not finite, an angle outside (0, pi], and poses that are not rigid.
@@ -57,11 +57,11 @@ class DoubleSphere(Spheres, Camera):
 
     @classmethod
     def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
-        """A common lens, and one with the second centre outside of the first sphere."""
+        """A common lens, and one with the second center outside of the first sphere."""
         frame = (width, height, 0.37 * width, 0.38 * width, 0.52 * width, 0.49 * height)
         return {
             "double_sphere": cls(*frame, -0.2, 0.59, camera_from_world),
-            "centre outside": cls(*frame, 1.5, 0.3, camera_from_world, math.radians(115)),
+            "center outside": cls(*frame, 1.5, 0.3, camera_from_world, math.radians(115)),
         }
 
     def elevation(self, side: Array, ahead: Array) -> Array:
@@ -88,7 +88,7 @@ class DoubleSphere(Spheres, Camera):
     def border(self) -> tuple[Array, Array]:
         """Unit direction from which on r does not increase, or is infinite."""
         side, ahead = super().border()
-        # A centre outside of the first sphere sees it twice.
+        # A center outside of the first sphere sees it twice.
         outside = self.xi > 1
         inverse = 1 / where(outside, self.xi, 1.0)
         front, back = self._ends()

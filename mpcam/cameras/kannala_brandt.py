@@ -21,7 +21,7 @@ class KannalaBrandt(Calibrated, Camera):
     Kannala and Brandt 2006, equation 6, with the first coefficient absorbed by fx and fy, as in OpenCV's fisheye,
     COLMAP's OPENCV_FISHEYE and Kalibr's pinhole with equidistant distortion.
 
-    width, height: pixels. fx, fy, cx, cy: focal lengths and principal point, pixels, centre of the top left pixel at
+    width, height: pixels. fx, fy, cx, cy: focal lengths and principal point, pixels, center of the top left pixel at
     (0.5, 0.5). k: k1 to k4. camera_from_world: 4x4, OpenCV axes. max_angle: largest angle between a ray and the axis,
     radians. The domain ends there, or where r stops increasing with theta, whichever comes first; points and pixels
     beyond are invalid. The inverse is bracketed on that interval and never passes through the plane z = 1.

@@ -14,7 +14,7 @@ class Orthographic(Camera):
     """Parallel projection along +z: pixel = (cx + scale x, cy + scale y) for points with z >= 0.
 
     width, height: pixels. scale: pixels per scene unit (defaults to half the smaller side: [-1, 1] fills the image).
-    cx, cy: pixel of the axis (defaults to the image centre). camera_from_world: 4x4, OpenCV axes. Depth is z.
+    cx, cy: pixel of the axis (defaults to the image center). camera_from_world: 4x4, OpenCV axes. Depth is z.
     Raises InputError for sizes below 1, a scale that is not positive, and poses that are not rigid.
     """
 

@@ -1,6 +1,6 @@
 """Box and three lines around a small curved triangle, from what each vertex knows of the projection around it.
 
-For images that are symmetric about the axis, pixel = centre + focal * (s x, s y) with s = f(theta) / rho. A point that
+For images that are symmetric about the axis, pixel = center + focal * (s x, s y) with s = f(theta) / rho. A point that
 moves along v has the image velocity focal * (s v_xy + (p (v . xy) - q v_z) xy), where p and q too depend on the point
 alone. So s, p and q are worked out once per vertex, and a triangle needs no angle and no profile.
 
@@ -90,7 +90,7 @@ def symmetric_vertex_view(profile: Profile, view: Array, end: Array, point: Vect
 
 
 def small_outline(
-    centre: tuple[Array, Array], focal: tuple[Array, Array], points: list[Vector], views: list[VertexView]
+    center: tuple[Array, Array], focal: tuple[Array, Array], points: list[Vector], views: list[VertexView]
 ) -> tuple[Outline, Array]:
     """Outline of a triangle from its corners (camera frame), and whether it holds; else look for a rougher one.
 
@@ -101,7 +101,7 @@ def small_outline(
     hidden = minimum(minimum(places[0], places[1]), places[2]) >= HIDDEN
     sure = maximum(maximum(places[0], places[1]), places[2]) <= NEAR
     images = [
-        vector(centre[0] + focal[0] * (lens.s * point[0]), centre[1] + focal[1] * (lens.s * point[1]))
+        vector(center[0] + focal[0] * (lens.s * point[0]), center[1] + focal[1] * (lens.s * point[1]))
         for point, lens in zip(points, views, strict=True)
     ]
     low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]

@@ -19,7 +19,7 @@ class Pinhole(Camera):
     """Central perspective: pixel = (cx + fx x / z, cy + fy y / z) for points with z > 0.
 
     width, height: pixels. fx, fy: focal lengths, pixels (fy defaults to fx, fx to width / 2: 90 degrees across).
-    cx, cy: principal point, pixels, centre of the top left pixel at (0.5, 0.5) (defaults to the image centre).
+    cx, cy: principal point, pixels, center of the top left pixel at (0.5, 0.5) (defaults to the image center).
     camera_from_world: 4x4, OpenCV axes. Raises InputError for sizes below 1, focal lengths that are not positive,
     numbers that are not finite, and poses that are not rigid.
     """
@@ -44,7 +44,7 @@ class Pinhole(Camera):
 
     @classmethod
     def from_fov(cls, width: int, height: int, fov_x: float, camera_from_world: Any = None) -> Self:
-        """Square pixels, centred, `fov_x` radians across the width; raises InputError outside (0, pi)."""
+        """Square pixels, centered, `fov_x` radians across the width; raises InputError outside (0, pi)."""
         if not 0 < fov_x < PI:
             raise InputError(f"Pinhole.from_fov(fov_x={fov_x!r}): radians between 0 and pi are needed")
         return cls(width, height, 0.5 * width / tan(0.5 * fov_x), camera_from_world=camera_from_world)
@@ -69,7 +69,7 @@ class Pinhole(Camera):
 
     @classmethod
     def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
-        """Some 80 degrees across, off centre."""
+        """Some 80 degrees across, off center."""
         frame = (0.6 * width, 0.55 * width, 0.47 * width, 0.52 * height)
         return {"pinhole": cls(width, height, *frame, camera_from_world)}
 

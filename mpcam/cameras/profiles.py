@@ -1,4 +1,4 @@
-"""Radial profiles r = f(theta): how far from the image centre a ray at angle theta from the axis lands.
+"""Radial profiles r = f(theta): how far from the image center a ray at angle theta from the axis lands.
 
 The four profiles of Gascuel et al. 2008 (Table 1) and any increasing function of a user. Table 1 lists five: its
 "Lambert conformal" is the equal-area projection and the same as its first fish-eye, since
@@ -38,7 +38,7 @@ class Profile:
 
     radius, slope: r and dr/dtheta of theta (radians). angle: theta of r. limit: the profile is defined and increasing
     on [0, limit) or [0, limit], radians. convex: whether 1/f is a convex, increasing-from-tangent function of
-    cot(theta), which makes the images of straight lines bulge away from the centre, so
+    cot(theta), which makes the images of straight lines bulge away from the center, so
     that tangents bound them; bounds fall back to annular sectors where it is False.
 
     toward, direction: radius and angle once more, where they have a form in the unit direction's distance from the
@@ -112,7 +112,7 @@ EQUIDISTANT = Profile(
     True,
     True,
 )
-"""r = 2 theta / pi: distance from the centre is proportional to the angle."""
+"""r = 2 theta / pi: distance from the center is proportional to the angle."""
 
 PROFILES = {profile.name: profile for profile in (PARABOLOID, COSINE_SPHERE, EQUISOLID, EQUIDISTANT)}
 
@@ -149,7 +149,7 @@ def custom_profile(
         what = f"is not finite at theta = {bad:.4g}" if bad is not None else f"maps shape {theta.shape} to {r.shape}"
         raise InputError(f"profile {name!r} {what}: give a function that is finite on [0, {max_angle:.4g}]")
     if abs(r[0]) > 1e-9 * abs(r[-1]):
-        raise InputError(f"profile {name!r}: f(0) = {r[0]:.3g}; the axis must land on the image centre, f(0) = 0")
+        raise InputError(f"profile {name!r}: f(0) = {r[0]:.3g}; the axis must land on the image center, f(0) = 0")
     fall = np.flatnonzero(np.diff(r) <= 0)
     if fall.size:
         raise InputError(

@@ -107,7 +107,7 @@ def _circle_quad(camera: RadialCamera, ends: list[Vector], images: list[Vector])
     """Chord, and the tangent parallel to it: the image of the arc is less than half a circle of radius 1 / sin(b).
 
     b is the angle of the great circle's highest point from the axis (equation 6 of the paper, whose sign is mended).
-    The height over the chord comes from its length, not from the circle's centre: a short chord of a large circle would
+    The height over the chord comes from its length, not from the circle's center: a short chord of a large circle would
     lose all its digits there.
     """
     _, _, sine, _ = _axes(ends)
@@ -132,16 +132,16 @@ def _generic_quad(camera: RadialCamera, ends: list[Vector], images: list[Vector]
 
     Where the circle's tangent hardly faces the perpendiculars (an edge nearly through the axis), the quad is endless.
     """
-    centred = [vector(image[0] - camera.cx, image[1] - camera.cy) for image in images]
-    lengths = [sqrt(p[0] * p[0] + p[1] * p[1]) for p in centred]
+    centered = [vector(image[0] - camera.cx, image[1] - camera.cy) for image in images]
+    lengths = [sqrt(p[0] * p[0] + p[1] * p[1]) for p in centered]
     largest = maximum(lengths[0], lengths[1])
     units = [
-        vector(p[0] / where(r > 0, r, 1.0), p[1] / where(r > 0, r, 1.0)) for p, r in zip(centred, lengths, strict=True)
+        vector(p[0] / where(r > 0, r, 1.0), p[1] / where(r > 0, r, 1.0)) for p, r in zip(centered, lengths, strict=True)
     ]
     middle = vector(units[0][0] + units[1][0], units[0][1] + units[1][1])
     size = sqrt(middle[0] * middle[0] + middle[1] * middle[1])
     middle = vector(middle[0] / where(size > 0, size, 1.0), middle[1] / where(size > 0, size, 1.0))
-    chord = vector(centred[1][0] - centred[0][0], centred[1][1] - centred[0][1])
+    chord = vector(centered[1][0] - centered[0][0], centered[1][1] - centered[0][1])
     length = sqrt(chord[0] * chord[0] + chord[1] * chord[1])
     out = vector(-chord[1] / where(length > 0, length, 1.0), chord[0] / where(length > 0, length, 1.0))
     facing = out[0] * middle[0] + out[1] * middle[1]
@@ -149,7 +149,7 @@ def _generic_quad(camera: RadialCamera, ends: list[Vector], images: list[Vector]
     facing = abs(facing)
     wild = (size < 1e-3) | (facing < 1e-3) | (length == 0)
     corners = []
-    for p, image in zip(centred, images, strict=True):
+    for p, image in zip(centered, images, strict=True):
         t = (largest - (p[0] * middle[0] + p[1] * middle[1])) / where(wild, 1.0, facing)
         t = maximum(t, 0.0)
         corners.append(vector(image[0] + t * out[0], image[1] + t * out[1]))

@@ -1,4 +1,4 @@
-"""Single-centre cameras with radial symmetry, r = f(theta) (Gascuel et al. 2008)."""
+"""Single-center cameras with radial symmetry, r = f(theta) (Gascuel et al. 2008)."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import COSINE_SPHERE, EQUIDISTANT, EQUISOLID, PARABOLOID, PROFILES, Profile, custom_profile
 from mpcam.cameras.quads import radial_bound_quads
-from mpcam.cameras.symmetric import finite_pixel, project_centred, symmetric_image, symmetric_ray, within
+from mpcam.cameras.symmetric import finite_pixel, project_centered, symmetric_image, symmetric_ray, within
 from mpcam.cameras.tables import degrees, plain_value
 from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError, KeyProblem
@@ -21,12 +21,12 @@ from mpcam.math import PI, Array, Vector, library, vector
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Radial(Camera):
-    """A ray at angle theta from the axis lands at distance radius * f(theta) / f(fov / 2) from the centre.
+    """A ray at angle theta from the axis lands at distance radius * f(theta) / f(fov / 2) from the center.
 
     width, height: pixels. profile: a `Profile`, the name of a built-in one, or use the constructors `paraboloid`,
     `cosine_sphere`, `equisolid`, `equidistant`, `from_function`. camera_from_world: 4x4, OpenCV axes. fov: full angle
-    of view, radians (default pi). radius: pixels from the centre to the rim of the view (default: the inscribed
-    circle). cx, cy: centre, pixels (default: the image centre). With fov = pi, the built-in profiles have f = 1 at the
+    of view, radians (default pi). radius: pixels from the center to the rim of the view (default: the inscribed
+    circle). cx, cy: center, pixels (default: the image center). With fov = pi, the built-in profiles have f = 1 at the
     rim. Pixels outside of the rim are invalid.
 
     Raises InputError for sizes below 1, a field of view that the profile cannot reach, unknown profiles, and poses that
@@ -165,8 +165,8 @@ class Radial(Camera):
         return symmetric_ray(self.profile, (u - self.cx) / scale, (v - self.cy) / scale, self.radius / scale, valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """Image of a point in the camera frame; valid up to the rim, not at the camera's centre."""
-        return (project_centred(self, point),)
+        """Image of a point in the camera frame; valid up to the rim, not at the camera's center."""
+        return (project_centered(self, point),)
 
     def local_image(self, point: Vector) -> tuple[Vector, Array]:
         """Pixel of a point, also beyond the rim as far as f goes on, and whether it lies within the field of view."""

@@ -1,6 +1,6 @@
 """What lenses made of spheres and a pinhole share, in closed form both ways.
 
-A unit direction (side, ahead), the sine and the cosine of its angle theta from the axis, appears from the centre of the
+A unit direction (side, ahead), the sine and the cosine of its angle theta from the axis, appears from the center of the
 last sphere along (across, height), of length d, and in the image at the radius r = side / (alpha d + (1 - alpha)
 height). Sums stand for differences of nearly equal numbers wherever the formulas have them: for directions far from the
 axis, and for parameters near those of simpler lenses.
@@ -32,7 +32,7 @@ class Spheres(Calibrated):
         return 1.0
 
     def elevation(self, side: Array, ahead: Array) -> Array:
-        """Height of a unit direction over the last sphere's centre."""
+        """Height of a unit direction over the last sphere's center."""
         raise TypeError(f"{type(self).__name__} must define elevation")
 
     def turning(self, side: Array, ahead: Array) -> Array:
@@ -40,7 +40,7 @@ class Spheres(Calibrated):
         raise TypeError(f"{type(self).__name__} must define turning")
 
     def seen_at(self, across: Array, height: Array) -> tuple[Array, Array]:
-        """The unit direction that appears from the last sphere's centre along a unit vector (across, height)."""
+        """The unit direction that appears from the last sphere's center along a unit vector (across, height)."""
         raise TypeError(f"{type(self).__name__} must define seen_at")
 
     def radius_toward(self, side: Array, ahead: Array) -> Array:

@@ -33,7 +33,7 @@ def finite_pixel(pixel: Vector) -> tuple[Array, Array, Array]:
 
 
 def symmetric_ray(profile: Profile, x: Array, y: Array, rim: Array, valid: Array) -> Ray:
-    """Ray of an image point relative to the centre; valid up to the radius `rim`, where it was valid before."""
+    """Ray of an image point relative to the center; valid up to the radius `rim`, where it was valid before."""
     squared = x * x + y * y
     distance = sqrt(where(squared > 0, squared, 1.0))
     rim = rim * (1.0 + 4.0 * epsilon(distance))
@@ -44,11 +44,11 @@ def symmetric_ray(profile: Profile, x: Array, y: Array, rim: Array, valid: Array
     sideways = where(off_axis, side / distance, 0.0)
     zero = 0.0 * x
     inside = where(valid, 1.0, 0.0)
-    # At the centre the slope of the direction in the image point is 1 / f'(0).
-    centre = 1.0 / profile.slope(zero)
+    # At the center the slope of the direction in the image point is 1 / f'(0).
+    center = 1.0 / profile.slope(zero)
     direction = vector(
-        where(off_axis, x * sideways * inside, x * centre * inside),
-        where(off_axis, y * sideways * inside, y * centre * inside),
+        where(off_axis, x * sideways * inside, x * center * inside),
+        where(off_axis, y * sideways * inside, y * center * inside),
         where(valid, ahead, 1.0),
     )
     return Ray(vector(zero, zero, zero), direction, valid)
@@ -97,7 +97,7 @@ def within(theta: Array, limit: Array) -> Array:
     return theta <= limit * (1.0 + 4.0 * epsilon(theta))
 
 
-class CentredCamera(Protocol):
+class CenteredCamera(Protocol):
     """A camera that gives the pixel of a finite point, and knows the pixel of its axis."""
 
     @property
@@ -107,8 +107,8 @@ class CentredCamera(Protocol):
     def local_image(self, point: Vector) -> tuple[Vector, Array]: ...
 
 
-def project_centred(camera: CentredCamera, point: Vector) -> Projection:
-    """Image of a point in the camera frame; not valid outside of the domain, nor at the camera's centre."""
+def project_centered(camera: CenteredCamera, point: Vector) -> Projection:
+    """Image of a point in the camera frame; not valid outside of the domain, nor at the camera's center."""
     x, y, z = point
     finite = isfinite(x) & isfinite(y) & isfinite(z)
     point = vector(where(finite, x, 0.0), where(finite, y, 0.0), where(finite, z, 0.0))

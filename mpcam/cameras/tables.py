@@ -109,7 +109,7 @@ def _keys(maker: Any, hints: dict[str, Any]) -> dict[str, Key]:
 
 
 def _derived(model: type) -> dict[str, Key]:
-    """The fields of a model as keys: two focal lengths and the centre each in one, the domain in degrees."""
+    """The fields of a model as keys: two focal lengths and the center each in one, the domain in degrees."""
     fields = _keys(model, get_type_hints(model, include_extras=True))
     keys: dict[str, Key] = {}
     if fields.keys() >= {"fx", "fy"}:

@@ -21,7 +21,7 @@ LARGEST_SLACK = 2.0**-10
 """The same at most, as a weight, and as a fraction of the distance."""
 
 UNCERTAIN = 0.25
-"""Weights that rounding may change by this much are no image: slits, centres and the like."""
+"""Weights that rounding may change by this much are no image: slits, centers and the like."""
 
 RESIDUAL = 64.0
 """Largest |p + c D - q| of an image, component by component, in units of eps times the sum of the magnitudes."""
@@ -59,7 +59,7 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     v, d: three corners and three directions, each of three components; q: a point. All components broadcast. Lengths of
     d are free: they scale with 1 / c, and their ratios decide which camera it is. A point on the camera triangle
     counts, at c = 0, and so does a weight that is negative by rounding only. Images where the ray's points form a
-    family of more than one (slits, centres, everything in one plane) are invalid, as are numbers that are none.
+    family of more than one (slits, centers, everything in one plane) are invalid, as are numbers that are none.
 
     Derivatives with respect to v, d and q come from the implicit-function theorem (Newton's step on detached
     arguments); they are zero where invalid and on folds (caustics), where they are infinite.
@@ -75,9 +75,9 @@ def project(v: Any, d: Any, q: Any) -> tuple[Image, Image, Image]:
     corners, rays, point = given[:3], given[3:6], given[6]
     fixed = [tuple(detach(x) for x in row) for row in given]
     frame = _Scaled(fixed[:3], fixed[3:6], fixed[6])
-    k, centre = determinant_cubic(frame.a, frame.d)
-    roots = cubic_roots(*k, -LARGEST_SLACK - centre, 1.0 / frame.eps - centre)
-    roots = [Root(centre + root, exists) for root, exists in roots]
+    k, center = determinant_cubic(frame.a, frame.d)
+    roots = cubic_roots(*k, -LARGEST_SLACK - center, 1.0 / frame.eps - center)
+    roots = [Root(center + root, exists) for root, exists in roots]
     some = fine & (frame.longest > 0) & (frame.farthest > 0)
 
     def images(x: Array, exists: Array, others: list[Root]) -> Image:

@@ -34,7 +34,7 @@ class PosedRays(NamedTuple):
 class Projection(NamedTuple):
     """Images of points; k is the number of images that a point can have at most.
 
-    pixel (..., k, 2): u right, v down, centre of the top left pixel at (0.5, 0.5). depth (..., k): distance along the
+    pixel (..., k, 2): u right, v down, center of the top left pixel at (0.5, 0.5). depth (..., k): distance along the
     pixel's ray, scene units. valid (..., k): False where there is no such image. Valid pixels may lie outside of
     [0, width] x [0, height]: `Camera.contains` tells.
     """
@@ -58,7 +58,7 @@ class Box(NamedTuple):
 class Domain(NamedTuple):
     """Where a camera is defined.
 
-    max_angle: largest angle between the optical axis and a ray, radians; None where rays have no common centre.
+    max_angle: largest angle between the optical axis and a ray, radians; None where rays have no common center.
     image_radius: radius in pixels of the image circle around the camera's (cx, cy), or the larger one of an ellipse;
     None where the image goes on to infinity.
     """

@@ -21,7 +21,7 @@ class UnifiedOmni(Spheres, Camera):
     The enhanced unified camera model (Khomutenko, Garcia and Martinet 2016, equation 5). With beta = 1 it is the
     unified model of Mei and Rives 2007 without distortion: see `mei`, which takes that form's parameters.
 
-    width, height: pixels. fx, fy, cx, cy: pixels, centre of the top left pixel at (0.5, 0.5). alpha: 0 (a pinhole)
+    width, height: pixels. fx, fy, cx, cy: pixels, center of the top left pixel at (0.5, 0.5). alpha: 0 (a pinhole)
     to 1. beta: above 0. camera_from_world: 4x4, OpenCV axes. max_angle: largest angle between a ray and the axis,
     radians. The domain ends there, or where r stops increasing or is infinite, whichever comes first: z = -w d, with
     w = alpha / (1 - alpha) or its inverse, whichever is below 1.
@@ -108,7 +108,7 @@ class UnifiedOmni(Spheres, Camera):
 
     @property
     def xi(self) -> Array:
-        """Distance of the pinhole from the sphere's centre, for beta = 1: alpha / (1 - alpha)."""
+        """Distance of the pinhole from the sphere's center, for beta = 1: alpha / (1 - alpha)."""
         return self.alpha / (1 - self.alpha)
 
     def stretch(self) -> Array:
@@ -116,7 +116,7 @@ class UnifiedOmni(Spheres, Camera):
         return sqrt(self.beta)
 
     def elevation(self, side: Array, ahead: Array) -> Array:
-        """Height of a unit direction over the last sphere's centre, which is where the direction starts."""
+        """Height of a unit direction over the last sphere's center, which is where the direction starts."""
         return ahead
 
     def turning(self, side: Array, ahead: Array) -> Array:

@@ -29,7 +29,7 @@ ERROR_COLUMNS = (
         "projection_median",
         "Projection error, median",
         "px",
-        "Median distance from a pixel's centre to the exact image of the point shown there.",
+        "Median distance from a pixel's center to the exact image of the point shown there.",
     ),
     Quantity("projection_p95", "Projection error, 95%", "px", "95th percentile of the projection error."),
     Quantity("projection_max", "Projection error, largest", "px", "Largest projection error."),

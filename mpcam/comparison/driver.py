@@ -275,6 +275,6 @@ def _how(repeats: int, moving: bool) -> dict[str, str]:
     how["first frame"] = "preparing and the first frame, kernels compiled or loaded from Dr.Jit's cache on disk"
     how["truth"] = "first hits of the exact rays in Mitsuba (float32); the true image is the same shading of those hits"
     how["projection error"] = (
-        "from each hit pixel's centre to the exact image (float64) of the point that the triangle and barycentrics name"
+        "from each hit pixel's center to the exact image (float64) of the point that the triangle and barycentrics name"
     )
     return how

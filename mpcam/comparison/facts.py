@@ -34,13 +34,13 @@ def scene_facts(scene: Any, camera: Any, shading: str) -> dict[str, str]:
 
 def describe_camera(camera: Any) -> str:
     """The camera's class and its short parameters, e.g. "Radial(profile=paraboloid, fov=3.14)"."""
-    centre = (("cx", camera.width / 2), ("cy", camera.height / 2))
+    center = (("cx", camera.width / 2), ("cy", camera.height / 2))
     parts = []
     for item in fields(camera) if is_dataclass(camera) else ():
         value = getattr(camera, item.name)
         if item.name in ("width", "height") or item.name.startswith("_"):
             continue
-        if (item.name, value) in centre:
+        if (item.name, value) in center:
             continue  # goes without saying
         if isinstance(value, (bool, str)):
             parts.append(f"{item.name}={value}")

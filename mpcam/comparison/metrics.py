@@ -39,7 +39,7 @@ class HitErrors:
 
 @dataclass(frozen=True)
 class ProjectionErrors:
-    """Distances in pixels from each hit pixel's centre to the exact image of the point that it shows.
+    """Distances in pixels from each hit pixel's center to the exact image of the point that it shows.
 
     NaN without hits; a point that the camera does not see at all counts as infinitely far.
     """
@@ -70,7 +70,7 @@ def hit_errors(hits: Any, truth: Any) -> HitErrors:
 
 
 def projection_distances(camera: Any, mesh: Any, hits: Any) -> NDArray[np.float64]:
-    """Pixel distances (H, W) from each centre to the exact image of the point hit there; NaN where nothing is hit.
+    """Pixel distances (H, W) from each center to the exact image of the point hit there; NaN where nothing is hit.
 
     The point is the one that the triangle and the barycentrics name on `mesh`, projected in float64 by the camera, at
     first into the part of the pixel alone where it has many; of several images the nearest counts, and with none the
@@ -85,21 +85,21 @@ def projection_distances(camera: Any, mesh: Any, hits: Any) -> NDArray[np.float6
     corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)[triangle[rows, columns]]]
     first = corners[:, 0]
     points = first + weights[:, :1] * (corners[:, 1] - first) + weights[:, 1:] * (corners[:, 2] - first)
-    centre = np.stack([columns + 0.5, rows + 0.5], axis=-1)
+    center = np.stack([columns + 0.5, rows + 0.5], axis=-1)
     nearest = np.full(len(rows), np.inf)
     if isinstance(camera, ProjectsNear):
-        nearest = _distances(camera.project_near(points, centre), centre)
+        nearest = _distances(camera.project_near(points, center), center)
     rest = ~np.isfinite(nearest)  # rounding puts the image of an edge into a neighboring part
     if rest.any():
-        nearest[rest] = _distances(camera.project(points[rest]), centre[rest])
+        nearest[rest] = _distances(camera.project(points[rest]), center[rest])
     distance[rows, columns] = nearest
     return distance
 
 
-def _distances(projection: Any, centre: np.ndarray) -> NDArray[np.float64]:
-    """Pixels (N,) from centres to the nearest image."""
+def _distances(projection: Any, center: np.ndarray) -> NDArray[np.float64]:
+    """Pixels (N,) from centers to the nearest image."""
     pixel, valid = np.asarray(projection.pixel, np.float64), np.asarray(projection.valid)
-    return np.where(valid, np.linalg.norm(pixel - centre[:, None, :], axis=-1), np.inf).min(axis=-1)
+    return np.where(valid, np.linalg.norm(pixel - center[:, None, :], axis=-1), np.inf).min(axis=-1)
 
 
 def projection_errors(camera: Any, mesh: Any, hits: Any) -> ProjectionErrors:
@@ -150,7 +150,7 @@ def flip_map(image: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
 
 def _quantile(values: NDArray[np.float64], share: float) -> float:
     """A quantile that allows infinities; NaN for an empty array. The value at or above the share: no interpolation,
-    which would make NaN of two infinities and invents values between an outlier and its neighbour."""
+    which would make NaN of two infinities and invents values between an outlier and its neighbor."""
     return float(np.quantile(values, share, method="higher")) if values.size else float("nan")
 
 

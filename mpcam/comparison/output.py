@@ -85,7 +85,7 @@ def differences(comparison: Findings) -> dict[str, np.ndarray]:
 
 
 def magma(values: np.ndarray) -> np.ndarray:
-    """Values (H, W) in [0, 1] in the colours that FLIP is shown in, black to white, as linear RGB."""
+    """Values (H, W) in [0, 1] in the colors that FLIP is shown in, black to white, as linear RGB."""
     import matplotlib
 
     colors = matplotlib.colormaps["magma"](np.clip(values, 0.0, 1.0))[..., :3]

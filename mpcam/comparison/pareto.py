@@ -10,7 +10,7 @@ from mpcam.comparison.columns import COLUMNS, ERROR_COLUMNS, TIME_COLUMNS
 from mpcam.comparison.numbers import format_column, format_number
 from mpcam.comparison.rows import Findings, Row
 
-# "At float precision": 95% of the hits this near to their pixel's centre, and this share of pixels with the wrong hit.
+# "At float precision": 95% of the hits this near to their pixel's center, and this share of pixels with the wrong hit.
 # float32 pixel coordinates of a 1000-pixel image are 6e-5 apart; a ray's direction and its hit lose a few bits more.
 EXACT_PIXELS = 2e-3
 EXACT_MISMATCH = 1e-3

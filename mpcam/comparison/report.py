@@ -24,7 +24,7 @@ SCRIPTS = ("format.js", "plot.js", "table.js", "viewer.js", "theme.js", "main.js
 
 @dataclass(frozen=True)
 class RowImages:
-    """The images of one row: linear RGB (H, W, 3), and the coloured difference from the truth if there is a truth."""
+    """The images of one row: linear RGB (H, W, 3), and the colored difference from the truth if there is a truth."""
 
     image: np.ndarray
     difference: np.ndarray | None = None

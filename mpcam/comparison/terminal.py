@@ -48,7 +48,7 @@ def print_comparison(comparison: Findings, console: "Console | None" = None) -> 
 
 
 def as_text(comparison: Findings) -> str:
-    """The same without colours, as a string."""
+    """The same without colors, as a string."""
     from rich.console import Console
 
     out = io.StringIO()

@@ -54,7 +54,7 @@ def chained(
     least, most: how often each triangle is split in four at least, and at most (to 7). tolerance: radians that an
     interpolated ray may be turned off, and parts of the surface's radius that it may be shifted, before a triangle is
     split. Triangles that the surface's outline, or the border of total reflection, passes through are split too; what
-    is left of them at last does not go on. Where neighbours are split differently, rays may differ by the tolerance
+    is left of them at last does not go on. Where neighbors are split differently, rays may differ by the tolerance
     along their common edge. resolution: pixels along the short sides; default: those of `cams`, halved at each level.
     Raises InputError where no ray meets the surface and goes on.
     """

@@ -44,7 +44,7 @@ def decompose(
     """Camera triangles that stand for a reflector, or with `index` for a refractor, as an eye sees it.
 
     reflector: a Mesh (one without normals is taken for smooth; `Mesh.flat` makes facets) or a Surface. eye: a point
-    (3,) in the world, or a camera with a common centre. triangles: how many camera triangles at most; those that the
+    (3,) in the world, or a camera with a common center. triangles: how many camera triangles at most; those that the
     eye does not see (hidden by the reflector itself, or outside of the camera's image) are left out and do not count. A
     mesh of fewer triangles is taken as it is, which is exact; where the shape needs more to stay whole (a closed
     surface has 4, some of them seen), there are more. resolution: pixels along the short sides of each triangle in the

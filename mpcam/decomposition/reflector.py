@@ -105,7 +105,7 @@ class Reflector:
 
     @functools.cached_property
     def _scene(self) -> tuple[Any, np.ndarray]:
-        """Mitsuba's scene of the usable faces in units of the radius around the centre, and their numbers."""
+        """Mitsuba's scene of the usable faces in units of the radius around the center, and their numbers."""
         from mpcam.tracing.meshes import mitsuba_mesh
         from mpcam.tracing.variant import mitsuba
 
@@ -123,7 +123,7 @@ class Reflector:
 
     def closest(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Faces (N,) nearest to points (N, 3) among those on the side of normals (N, 3), and weights 2 and 3 there."""
-        tree, numbers, reach = self._centres
+        tree, numbers, reach = self._centers
         count = len(points)
         face, second, third = np.zeros(count, np.int64), np.zeros(count), np.zeros(count)
         left, near = np.arange(count), 16
@@ -147,11 +147,11 @@ class Reflector:
         return face, second, third
 
     @functools.cached_property
-    def _centres(self) -> tuple[KDTree, np.ndarray, float]:
+    def _centers(self) -> tuple[KDTree, np.ndarray, float]:
         numbers = np.flatnonzero(self.usable)
         corners = self.vertices[self.faces[numbers]]
-        centre = corners.mean(axis=1)
-        return KDTree(centre), numbers, float(np.linalg.norm(corners - centre[:, None], axis=-1).max())
+        center = corners.mean(axis=1)
+        return KDTree(center), numbers, float(np.linalg.norm(corners - center[:, None], axis=-1).max())
 
 
 @functools.lru_cache(maxsize=8)

@@ -24,7 +24,7 @@ FILTERS = ("linear", "nearest")
 class Resolver:
     """Atlas images to pictures of the reflector: all geometry is done once, a frame only gathers texels.
 
-    cams: CameraTriangles. reflector: the Mesh or Surface that they stand for. camera: any camera with a common centre,
+    cams: CameraTriangles. reflector: the Mesh or Surface that they stand for. camera: any camera with a common center,
     which must be the eye of `cams` (those with directions hold no eye: there it is taken on trust). filter: "linear"
     between texels of the same triangle, never of another or of the gutter between them, or "nearest".
 
@@ -32,7 +32,7 @@ class Resolver:
     direction: (H, W, 3) float32 unit direction in the world of the true reflected or refracted ray, for look-ups in an
     environment; for `cams` with directions that of their own ray; 0 where there is none, as at total reflection.
     points: (H, W, 3) float64 points of the reflector, 0 beside it. Raises InputError for another eye, a camera without
-    a common centre, and other filters.
+    a common center, and other filters.
     """
 
     mask: np.ndarray
@@ -118,8 +118,8 @@ class Resolver:
             back = [t.Float(np.ascontiguousarray(behind[..., c]).ravel()) + opaque_zero() for c in range(channels)]
         else:
             back = opaque_numbers([float(value) for value in np.broadcast_to(behind, channels)])
-        colour = self.on_device(t.Float(atlas.ravel()) + opaque_zero(), back)
-        return np.stack([np.asarray(part.numpy()) for part in colour], axis=-1).reshape(shape)
+        color = self.on_device(t.Float(atlas.ravel()) + opaque_zero(), back)
+        return np.stack([np.asarray(part.numpy()) for part in color], axis=-1).reshape(shape)
 
     @exclusive
     def on_device(self, texels: Any, background: list[Any]) -> list[Any]:
@@ -157,7 +157,7 @@ def texel_weights(
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Which texels of a triangle with `side` of them along its short sides make up the values at weights 2 and 3.
 
-    Returns column and row of the first, counted from corner 1, and for "linear" the weights of its neighbours: at the
+    Returns column and row of the first, counted from corner 1, and for "linear" the weights of its neighbors: at the
     next column, the next row, and both (the first has the rest to 1). Across the hypotenuse there is no fourth texel:
     there the other three are taken as a triangle.
     """
@@ -200,15 +200,15 @@ def _kernel(filter: str, channels: int) -> Any:
                 (data["first"] + below, down),
                 (data["first"] + below + data["step"], both),
             ]
-        colour = []
+        color = []
         for channel in range(channels):
             total = t.Float(0.0)
             for number, weight in offsets:
                 # Where the weight is nothing the texel may be another's, or hold no number.
                 some = hit & (t.Float(weight) > 0)
                 total += dr.gather(t.Float, texels, t.UInt(number * channels + channel), some) * weight
-            colour.append(dr.select(hit, total, background[channel]))
-        return colour
+            color.append(dr.select(hit, total, background[channel]))
+        return color
 
     return kernel
 

@@ -1,7 +1,7 @@
 """Normal shooting: which point of the true surface belongs to which of the camera triangles (Sander et al. 2000).
 
 Forward, a ray along the interpolated normal meets the fine surface. Backward, a fine point X = p(w) + c N(w) is found
-by Newton's method in the triangle where it is looked for; where a weight comes out negative, the neighbour across that
+by Newton's method in the triangle where it is looked for; where a weight comes out negative, the neighbor across that
 edge is next. The weights outside of a triangle say where to go, and c = 0 is near the root wanted, so that no other
 root of the cubic needs to be found and told apart; and a walk of a step or two from the nearest sample of the camera
 triangles serves however coarse or fine either surface is, where a fine face may straddle many camera triangles.
@@ -96,10 +96,10 @@ class Locator:
         self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         used = self.vertices[self.faces].reshape(-1, 3)
         self.center, self.size = used.mean(axis=0), float(np.ptp(used, axis=0).max()) or 1.0
-        self.neighbours = neighbours(self.faces)
+        self.neighbors = neighbors(self.faces)
         side = int(np.clip(np.sqrt(_SAMPLES / len(faces)), 2, 40))
         i, j = (v.ravel() for v in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
-        # Centres of the upright and of the reversed cells of a triangular grid.
+        # Centers of the upright and of the reversed cells of a triangular grid.
         upright, reversed_ = i + j < side, i + j < side - 1
         second = np.concatenate([i[upright] + 1 / 3, i[reversed_] + 2 / 3]) / side
         third = np.concatenate([j[upright] + 1 / 3, j[reversed_] + 2 / 3]) / side
@@ -126,8 +126,8 @@ class Locator:
             weights = np.stack([1.0 - w2 - w3, w2, w3], axis=1)
             done = solved & (weights.min(axis=1) >= -INSIDE)
             second[left], third[left], inside[left] = w2, w3, done
-            # Across the edge opposite to the most negative weight that has a neighbour.
-            beyond = self.neighbours[face[left]]
+            # Across the edge opposite to the most negative weight that has a neighbor.
+            beyond = self.neighbors[face[left]]
             step = np.where((weights < -INSIDE) & (beyond >= 0), weights, np.inf)
             edge = step.argmin(axis=1)
             row = np.arange(len(left))
@@ -185,7 +185,7 @@ class Locator:
         return np.where(good, second, 1 / 3), np.where(good, third, 1 / 3), solved & good
 
 
-def neighbours(faces: np.ndarray) -> np.ndarray:
+def neighbors(faces: np.ndarray) -> np.ndarray:
     """(F, 3) the face across the edge opposite to each corner, -1 at borders and where three or more faces meet."""
     count = len(faces)
     ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1).reshape(-1, 2), axis=1)

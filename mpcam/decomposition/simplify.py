@@ -190,7 +190,7 @@ def _possible(
 
 
 def _apart(count: int, edges: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Which of the chosen edges, best first, touch no better one, nor a neighbour of one."""
+    """Which of the chosen edges, best first, touch no better one, nor a neighbor of one."""
     rank = np.full(count, len(chosen))
     np.minimum.at(rank, chosen.ravel(), np.repeat(np.arange(len(chosen)), 2))
     around = rank.copy()

@@ -32,11 +32,11 @@ class View:
 
 
 def eye_point(eye: Any) -> np.ndarray:
-    """The point (3,) that rays leave from: the eye itself, or a camera's centre. Raises InputError for others."""
+    """The point (3,) that rays leave from: the eye itself, or a camera's center. Raises InputError for others."""
     if isinstance(eye, Camera):
         if eye.ray_geometry != "central":
             raise InputError(
-                f"the eye is a {type(eye).__name__}, whose rays have no common centre: give a point (3,), or a camera "
+                f"the eye is a {type(eye).__name__}, whose rays have no common center: give a point (3,), or a camera "
                 "with one"
             )
         return np.asarray(eye.eye, np.float64)
@@ -110,7 +110,7 @@ def surface_samples(reflector: Reflector, count: int) -> tuple[np.ndarray, np.nd
 
 
 def _through_pixels(reflector: Reflector, camera: Camera, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hits of a camera's pixel centres; of every n-th pixel where there are more than `most`."""
+    """Hits of a camera's pixel centers; of every n-th pixel where there are more than `most`."""
     number = np.arange(0, camera.width * camera.height, -(-camera.width * camera.height // most))
     v, u = np.divmod(number, camera.width)
     ray = camera.ray(np.stack([u + 0.5, v + 0.5], axis=-1))

@@ -15,7 +15,7 @@ MOST_DROPS = 4096
 SLACK = 2.0
 """Pixels' widths that a photon may lie off the surface that the eye sees there."""
 _BEND = 0.25
-"""Sine of the angle at which neighbouring photons no longer lie on one smooth surface."""
+"""Sine of the angle at which neighboring photons no longer lie on one smooth surface."""
 _SHADE = 2e-3
 """Part of the distance to the reflector that something must be nearer to the light to shade it."""
 _STEP = (0.7548776662466927, 0.5698402909980532)
@@ -267,7 +267,7 @@ def spread(width: int, height: int, radius: float) -> Any:
     kernel = {tap: weight for tap, weight in kernel.items() if weight > 0}
 
     def around(t: Any, pixel: Any) -> Any:
-        """Neighbours: number, weight, steps away, and whether they lie in the picture."""
+        """Neighbors: number, weight, steps away, and whether they lie in the picture."""
         row = pixel // width
         column = pixel - row * width
         for (dx, dy), weight in kernel.items():

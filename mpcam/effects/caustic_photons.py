@@ -181,8 +181,8 @@ def light_camera(light: np.ndarray, reflector: Reflector, size: int) -> Camera:
         # A reflector seen edge-on still has a view.
         spread = np.maximum(high - low, 1e-3 * max(float((high - low).max()), 1e-6))
         focal = room / spread
-        centre = 0.5 * size - focal * 0.5 * (low + high)
-        return Pinhole(size, size, focal[0], focal[1], centre[0], centre[1], camera_from_world=pose)
+        center = 0.5 * size - focal * 0.5 * (low + high)
+        return Pinhole(size, size, focal[0], focal[1], center[0], center[1], camera_from_world=pose)
     # Triangles between the vertices bulge out of their hull on the sphere by less than this.
     fov = min(2.0 * half * (1.0 + 4.0 * MARGIN / size), 2 * np.pi)
     return Radial.equisolid(size, size, pose, fov=fov, radius=0.5 * room)
@@ -195,7 +195,7 @@ def solid_angle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 
 def pixel_solid_angles(camera: Camera) -> np.ndarray:
-    """(H, W) steradians of the pixels of a camera with a common centre; 0 where a corner has no ray.
+    """(H, W) steradians of the pixels of a camera with a common center; 0 where a corner has no ray.
 
     Each pixel is the two triangles of its corners' rays: exact for a pinhole, and without gaps for any camera.
     """

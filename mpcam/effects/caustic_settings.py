@@ -34,11 +34,11 @@ class Settings:
                 "caustics: back= is where light leaves a lens: give index= with it, or leave it out for a mirror"
             )
         try:
-            colour = np.broadcast_to(np.asarray(self.reflectance, np.float64), 3)
+            color = np.broadcast_to(np.asarray(self.reflectance, np.float64), 3)
         except (TypeError, ValueError):
-            colour = np.full(3, np.nan)
-        if not ((colour >= 0) & (colour <= 1)).all():
+            color = np.full(3, np.nan)
+        if not ((color >= 0) & (color <= 1)).all():
             raise InputError(f"caustics(reflectance={shown(self.reflectance)}): give one number or three from 0 to 1")
-        red, green, blue = (float(part) for part in colour)
+        red, green, blue = (float(part) for part in color)
         object.__setattr__(self, "radius", float(self.radius))
         object.__setattr__(self, "reflectance", (red, green, blue))

@@ -1,7 +1,7 @@
 """Caustics: light that a curved mirror or lens gathers on what is near (Hou et al. 2006, section 3.3).
 
 The light is the eye of camera triangles. What they see of the receivers, looked up for each pixel of the light's view,
-is the photon-location map: where the pixel's light lands. Three neighbouring photons make a triangle; the ratio of its
+is the photon-location map: where the pixel's light lands. Three neighboring photons make a triangle; the ratio of its
 solid angle to that of the landed one is the concentration (Wyman and Davis 2006). Its flux, that of its photons, is
 dropped into the eye's picture at as many points as it covers pixels, so that neither folds nor wide triangles lose any,
 and spread there by a normalized kernel: irradiance times area, summed over the picture, is the flux that landed in it.
@@ -105,10 +105,10 @@ class Caustics:
 
     @exclusive
     def aim(self, camera: Camera) -> None:
-        """Another eye. Raises InputError for a camera without a common centre."""
+        """Another eye. Raises InputError for a camera without a common center."""
         if not isinstance(camera, Camera) or camera.ray_geometry != "central":
             raise InputError(
-                f"caustics: camera is a {type(camera).__name__}: give one of mpcam's cameras with a common centre"
+                f"caustics: camera is a {type(camera).__name__}: give one of mpcam's cameras with a common center"
             )
         self.camera = camera
         self._eye: Any = prepare(camera, self.seen_scene.mesh)
@@ -306,7 +306,7 @@ def caustics(
 
     scene: the receivers, a Scene, a Mesh or several meshes; each mesh is a surface of its own, over whose border no
     light spreads. reflector: a Mesh or Surface, not part of the scene; both of its sides count. light: a PointLight.
-    camera: the eye, any camera with a common centre. triangles, resolution: camera triangles, and pixels along the
+    camera: the eye, any camera with a common center. triangles, resolution: camera triangles, and pixels along the
     short sides of each in their atlas (Hou et al. 2006: 400 of 64). photons: pixels along a side of the light's view, 2
     to 4096. radius: pixels of the eye's picture that a photon is spread over, 0 to 8. index: refractive index behind
     the reflector over that on the light's side, None for a mirror. back: where the light leaves the lens again, its

@@ -24,19 +24,19 @@ class DeviceEnvironment:
     size: int
 
     def lookup(self, direction: Any) -> Any:
-        """Colours (Array3f) of world directions (Array3f, any length), bilinear."""
+        """Colors (Array3f) of world directions (Array3f, any length), bilinear."""
         import drjit as dr
 
         u, v, start = place(direction, dr.norm(direction), self.size)
-        colour = types().Array3f(0.0)
+        color = types().Array3f(0.0)
         for column, row, weight in four_texels(u, v, self.size, self.size):
             number = types().UInt(start + row * self.size + column)
-            colour += dr.gather(types().Array3f, self.texels, number) * weight
-        return colour
+            color += dr.gather(types().Array3f, self.texels, number) * weight
+        return color
 
 
 class EnvironmentMap:
-    """Colours in all directions from one point.
+    """Colors in all directions from one point.
 
     position (3,): world. images: two (H, W, 3) float32 pictures, linear RGB: the half-space towards world +x, and that
     towards -x, +z up. cameras: the two paraboloid cameras that they were taken with; each sees a little more than 180
@@ -91,7 +91,7 @@ class EnvironmentMap:
 
     @exclusive
     def lookup(self, directions: Any) -> np.ndarray:
-        """Colours (..., 3) float32 that arrive from world directions, bilinear between pixels.
+        """Colors (..., 3) float32 that arrive from world directions, bilinear between pixels.
 
         directions (..., 3): away from the position, any length above 0. Raises InputError for other shapes, and for
         directions that are zero or not finite.
@@ -100,8 +100,8 @@ class EnvironmentMap:
         if unit.size == 0:
             return np.zeros(unit.shape, np.float32)
         columns = np.ascontiguousarray(unit.reshape(-1, 3).T, np.float32)
-        colour = self.on_device.lookup(types().Array3f(columns))
-        return np.stack([np.asarray(part.numpy()) for part in colour], -1).reshape(unit.shape)
+        color = self.on_device.lookup(types().Array3f(columns))
+        return np.stack([np.asarray(part.numpy()) for part in color], -1).reshape(unit.shape)
 
     def __repr__(self) -> str:
         size = len(self.images[0])

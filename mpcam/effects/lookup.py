@@ -24,7 +24,7 @@ def check_size(size: Any, name: str = "size") -> int:
 
 
 def pixels_per_radius(size: int) -> float:
-    """Pixels from the centre of a view to its circle of 180 degrees."""
+    """Pixels from the center of a view to its circle of 180 degrees."""
     return 0.5 * size - RIM
 
 
@@ -55,7 +55,7 @@ def place(direction: Any, length: Any, size: int) -> tuple[Any, Any, Any]:
 
 
 def texel_direction(column: Any, row: Any, front: Any, size: int) -> Any:
-    """Unit world direction of a texel's centre: stereographic projection, inverted without trigonometry."""
+    """Unit world direction of a texel's center: stereographic projection, inverted without trigonometry."""
     import drjit as dr
 
     t = types()

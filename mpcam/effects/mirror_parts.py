@@ -48,7 +48,7 @@ class MirrorPart(Protocol):
         """New positions (V, 3) of the scene's vertices."""
         ...
 
-    def colours(self) -> list[Any]:
+    def colors(self) -> list[Any]:
         """Three Floats, one number for each pixel of the eye's camera, evaluated; anything beside the mirror."""
         ...
 
@@ -61,7 +61,7 @@ def explained(part: MirrorPart, method: str) -> Iterator[Step]:
 
 
 class Direct:
-    """The colours of first hits, one for each pixel of the eye."""
+    """The colors of first hits, one for each pixel of the eye."""
 
     def __init__(self, prepared: Any, shaded: Shaded):
         self.prepared, self.shaded = prepared, shaded
@@ -69,7 +69,7 @@ class Direct:
     def update(self, vertices: np.ndarray) -> None:
         self.prepared.update(vertices)
 
-    def colours(self) -> list[Any]:
+    def colors(self) -> list[Any]:
         return list(self.shaded(self.prepared.frame()))
 
 
@@ -90,7 +90,7 @@ class ByTriangles(Direct):
             "atlas to picture": "texels by the true surface's points, found once",
         }
 
-    def colours(self) -> list[Any]:
+    def colors(self) -> list[Any]:
         import drjit as dr
 
         atlas = self.shaded(self.prepared.frame())
@@ -130,7 +130,7 @@ class ByEnvironment:
         for view in self.views:
             view.update(vertices)
 
-    def colours(self) -> list[Any]:
+    def colors(self) -> list[Any]:
         import drjit as dr
 
         parts: list[Any] = [dr.ravel(self.shaded(view.frame())) for view in self.views]

@@ -23,8 +23,8 @@ from mpcam.scene.scene import Scene
 WEIGHTS = {"cosine": "cosine_sphere", "uniform": "equisolid"}
 OFFSET = 1e-5  # of half the longest side of the mesh: some thirty times what float32 loses
 MOST = 4096  # pixels along a side
-# The grid of pixels must not line up with what is seen, or whole edges fall between two rows of centres: the disc's
-# centre lies off the grid, and the grid is turned to a slope of the golden ratio.
+# The grid of pixels must not line up with what is seen, or whole edges fall between two rows of centers: the disc's
+# center lies off the grid, and the grid is turned to a slope of the golden ratio.
 CENTRE = (0.17, -0.31)  # pixels from the middle of the image
 ROLL = (0.8506508083520400, 0.5257311121191336)
 
@@ -51,8 +51,8 @@ def form_factor(
         offset = OFFSET * 0.5 * float((whole.bounds[1] - whole.bounds[0]).max())
     elif not is_number(offset):
         raise InputError(f"offset={offset!r}: a finite length in scene units is needed")
-    centre = [0.5 * size + shift for shift in CENTRE]
-    camera = Radial(size, size, kind, radius=0.5 * size - 0.5, cx=centre[0], cy=centre[1])
+    center = [0.5 * size + shift for shift in CENTRE]
+    camera = Radial(size, size, kind, radius=0.5 * size - 0.5, cx=center[0], cy=center[1])
     counts = _covered(camera, whole, (eyes + offset * along).reshape(-1, 3), along.reshape(-1, 3))
     return counts.reshape(eyes.shape[:-1])
 

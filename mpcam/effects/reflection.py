@@ -31,7 +31,7 @@ from mpcam.scene.scene import Scene
 class Reflection:
     """Frames of a scene with a mirror; everything that does not change with the scene's vertices is made here.
 
-    scene: its meshes are seen in the mirror and beside it. mirror: default the scene's. camera: with a common centre;
+    scene: its meshes are seen in the mirror and beside it. mirror: default the scene's. camera: with a common center;
     default the scene's. method: "camera_triangles"; "vertex", the images of the scene's vertices in camera triangles,
     joined by straight edges, each split 2**level times first; "environment", an environment map from the mirror's
     middle, two views of `size` (512) pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as
@@ -65,7 +65,7 @@ class Reflection:
         if not isinstance(found, Mirror):
             raise InputError(f"mirror is a {type(found).__name__}: give mpcam.Mirror(surface)")
         if not isinstance(given, Camera) or given.ray_geometry != "central":
-            raise InputError("a camera with a common centre is needed to look into a mirror: give one as camera=")
+            raise InputError("a camera with a common center is needed to look into a mirror: give one as camera=")
         check_shading(shading)
         check_shadows(shadows, scene, shading)
         self.camera, self.mirror = given, found
@@ -118,10 +118,10 @@ class Reflection:
         """One frame on the device: an evaluated Array3f, one entry per pixel."""
         hits = self.direct.frame()
         beside = self.shaded(hits)
-        return _over(hits.device_depth, beside, self.distance, self.part.colours(), self._color)
+        return _over(hits.device_depth, beside, self.distance, self.part.colors(), self._color)
 
     def shaded(self, hits: Hits) -> Any:
-        """Colours of hits on the scene, on the device."""
+        """Colors of hits on the scene, on the device."""
         return shade_device(hits, self.scene, self.shading, self.shadows)
 
     @exclusive
@@ -167,9 +167,9 @@ class Reflection:
         return np.isfinite(self.rays.distance).reshape(self.camera.height, self.camera.width)
 
 
-def _over(depth: Any, beside: Any, distance: Any, colours: list[Any], color: list[Any]) -> Any:
-    """The mirror's colours where it is nearer than the rest."""
-    return _over_kernel()(depth, beside, distance, colours, color)
+def _over(depth: Any, beside: Any, distance: Any, colors: list[Any], color: list[Any]) -> Any:
+    """The mirror's colors where it is nearer than the rest."""
+    return _over_kernel()(depth, beside, distance, colors, color)
 
 
 @functools.cache
@@ -179,9 +179,9 @@ def _over_kernel() -> Any:
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def over(depth: Any, beside: Any, distance: Any, colours: list[Any], color: list[Any]) -> Any:
+    def over(depth: Any, beside: Any, distance: Any, colors: list[Any], color: list[Any]) -> Any:
         t = types()
-        seen = t.Array3f(*(part * tint for part, tint in zip(colours, color, strict=True)))
+        seen = t.Array3f(*(part * tint for part, tint in zip(colors, color, strict=True)))
         return dr.select(distance < depth, seen, t.Array3f(beside))
 
     return over

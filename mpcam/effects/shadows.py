@@ -4,9 +4,9 @@ A point light looks around with two paraboloid views, parallel light with one or
 mesh. A surface element at distance r from the light is lit where the map is not nearer than the element. How much
 nearer a texel may be without harm follows from the texel, not from a constant:
 
-- With normals, the depth at which the element's own plane crosses the ray of the texel's centre takes the place of r
+- With normals, the depth at which the element's own plane crosses the ray of the texel's center takes the place of r
   wherever it is less: a flat receiver never shades itself, however steep the light.
-- One texel's width at the distance r is taken off on top of that, for the neighbour that meets the element in a corner,
+- One texel's width at the distance r is taken off on top of that, for the neighbor that meets the element in a corner,
   and for curved surfaces. An occluder nearer to its receiver than this is missed.
 - Without normals, slopes are unknown and three widths are taken off.
 

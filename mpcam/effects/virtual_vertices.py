@@ -28,7 +28,7 @@ from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 class VirtualVertices(VertexProjected):
     """Frames of a mesh seen in camera triangles, in the picture of their eye; edges are split 2**level times first.
 
-    camera: the eye's, with a common centre. cams: camera triangles that it sees. rays: those of the true surface, one
+    camera: the eye's, with a common center. cams: camera triangles that it sees. rays: those of the true surface, one
     per pixel, with which hits are shaded. Of several images of a vertex the one nearest to the mirror counts; triangles
     with a corner that has none are left out. The depth of hits is the distance from the mirror. Raises InputError for
     other levels.
@@ -119,14 +119,14 @@ def _cones(table: np.ndarray) -> Any:
 
     t, count = types(), table.shape[2]
     places, ways = table[0::2], table[1::2] / np.linalg.norm(table[1::2], axis=1, keepdims=True)
-    centre, axis = places.mean(axis=0), ways.mean(axis=0)
+    center, axis = places.mean(axis=0), ways.mean(axis=0)
     axis /= np.maximum(np.linalg.norm(axis, axis=0), 1e-20)
     reach, spread = (
         np.linalg.norm(values - middle, axis=1).max(axis=0) * (1 + 1e-5)
-        for values, middle in ((places, centre), (ways, axis))
+        for values, middle in ((places, center), (ways, axis))
     )
     spread = np.where(spread < 1.2, spread, 2.0)  # caps beyond a half-sphere hold nothing between
-    numbers = [np.ascontiguousarray(values, np.float32) for values in (centre, reach, axis, spread)]
+    numbers = [np.ascontiguousarray(values, np.float32) for values in (center, reach, axis, spread)]
     cone = Cone(t.Array3f(numbers[0]), t.Float(numbers[1]), t.Array3f(numbers[2]), t.Float(numbers[3]), t.Float(0))
     target = room(t, 2, count)
     target.store(cone.rows(t), threads(t, 0, count))

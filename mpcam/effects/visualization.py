@@ -24,7 +24,7 @@ TURN = 2 * np.pi
 
 
 def surround(
-    centre: Any,
+    center: Any,
     radius: float = 2.0,
     height: float = 2.0,
     columns: int = 20,
@@ -39,7 +39,7 @@ def surround(
 ) -> CameraTriangles:
     """A cylindrical strip of 2 x columns x rows direct camera triangles around an upright axis; default: 400.
 
-    centre (3,): world, the middle of the strip; the axis is world z. radius, height: scene units. columns, rows: cells
+    center (3,): world, the middle of the strip; the axis is world z. radius, height: scene units. columns, rows: cells
     of the strip, each two camera triangles. inward: rays look at the axis (the strip is seen from outside), else away
     from it. slant: radians that rays are tilted up, one number or those of the lowest and the highest row. twist:
     radians that rays are turned about the axis, counter-clockwise from above, one number or two. start: bearing of the
@@ -47,7 +47,7 @@ def surround(
     at most 2 pi. resolution: pixels along a cell. Frame: that of the strip, moved by `camera_from_world`. Raises
     InputError.
     """
-    middle = as_vector(centre, "centre")
+    middle = as_vector(center, "center")
     for name, value in (("radius", radius), ("height", height), ("angle", angle)):
         _number(name, value, above=True)
     _number("start", start)
@@ -121,7 +121,7 @@ def grid_of(cams: CameraTriangles) -> Grid:
 class Unrolled:
     """Lays an atlas of `surround` out as one continuous panorama; made once, it serves all frames and poses.
 
-    width, height: pixels; neighbouring cells share the pixels of their common edge, and a full turn ends one pixel
+    width, height: pixels; neighboring cells share the pixels of their common edge, and a full turn ends one pixel
     before it begins again. pixel: (height, width) atlas pixel, row by row, of each; no pixel is mixed from others.
     """
 
@@ -197,7 +197,7 @@ def unrolled(cams: CameraTriangles, image: Any) -> np.ndarray:
 def walker_scene(triangles: int = 6_841) -> Scene:
     """A walking person in a ring of columns on a plain ground: about so many triangles (Hou et al. 2006, Table 1).
 
-    The walker stands at the origin and goes along -y; metres, z up. triangles: 3,000 to 200,000; met within 3 %.
+    The walker stands at the origin and goes along -y; meters, z up. triangles: 3,000 to 200,000; met within 3 %.
     """
     from mpcam.geometry.character_body import Look, Sizes, figure
     from mpcam.geometry.shapes import Builder, copies, lathe, placements, quads
@@ -211,8 +211,8 @@ def walker_scene(triangles: int = 6_841) -> Scene:
     profile = [(0.24, 0.0), (0.24, 0.12), (0.17, 0.2), (0.14, 2.5), (0.22, 2.65), (0.22, 2.8), (0.0, 2.8)]
     column = lathe(profile[:-1], 12, smooth=False)
     places = placements(np.stack([4.2 * np.cos(around), 4.2 * np.sin(around), 0.0 * around], axis=1))
-    for number, colour in enumerate(("#b5493a", "#d8c9a3", "#3f6b8f")):
-        builder.add(copies(column, places[number::3]), painted(f"column {number}", colour))
+    for number, color in enumerate(("#b5493a", "#d8c9a3", "#3f6b8f")):
+        builder.add(copies(column, places[number::3]), painted(f"column {number}", color))
     look = Look("#e2b08c", "#3a2a20", "#b23a3a", "#2f3f5f", "walk", hat="#4b3a2a")
     sizes = Sizes(1.0)
     figure(look, sizes)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpcam.errors import InputError
-from mpcam.experiments.catalogue import EXPERIMENTS
+from mpcam.experiments.catalog import EXPERIMENTS
 
 if TYPE_CHECKING:
     from mpcam.comparison.progress import Progress

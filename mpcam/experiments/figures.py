@@ -11,7 +11,7 @@ DPI = 150
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of a plot: text, weak text, grid, page, and a palette that colour-blind readers can tell apart."""
+    """Colors of a plot: text, weak text, grid, page, and a palette that color-blind readers can tell apart."""
 
     name: str
     ink: str
@@ -21,7 +21,7 @@ class Theme:
     palette: tuple[str, ...]
 
 
-# The page's own colours.
+# The page's own colors.
 LIGHT = Theme(
     "light",
     "#1c1e21",

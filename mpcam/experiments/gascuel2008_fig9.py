@@ -105,7 +105,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
 
 
 def accessed(hits: Any, wasted: dict[str, np.ndarray], bound: str) -> np.ndarray:
-    """The paper's false colours: red and green are the weights of the hit, blue how many tests were in vain.
+    """The paper's false colors: red and green are the weights of the hit, blue how many tests were in vain.
 
     Blue goes by the logarithm, on one scale for all bounds.
     """

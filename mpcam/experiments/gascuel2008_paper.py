@@ -16,7 +16,7 @@ TABLE_2 = {
     (16, "5 hemicube faces"): (7.1, 4.3, 4.0),
     (16, "1 paraboloid"): (2.5, 1.9, 1.6),
 }
-"""Milliseconds for colour, depth and coverage. The authors' slides have 2.2 where the table has 2.4."""
+"""Milliseconds for color, depth and coverage. The authors' slides have 2.2 where the table has 2.4."""
 
 
 class Steps(NamedTuple):

@@ -48,7 +48,7 @@ class Case:
     scene: Scene
 
     def run(self) -> None:
-        """One frame of each view; for colour, all its pixels shaded."""
+        """One frame of each view; for color, all its pixels shaded."""
         for view in self.prepared:
             frame = view.frame()
             if self.output == "color":
@@ -173,7 +173,7 @@ def _time_table(sets: dict[int, Any], milliseconds: dict[Any, float]) -> Table:
 
 
 def _titles() -> Iterable[tuple[str, str]]:
-    return zip(OUTPUTS, ("Colour", "Depth", "Coverage"), strict=True)
+    return zip(OUTPUTS, ("Color", "Depth", "Coverage"), strict=True)
 
 
 def _reading(table: Table, wrong: dict[Any, float]) -> str:

@@ -155,22 +155,22 @@ def sky(size: int = 512) -> EnvironmentMap:
     up = np.sin(np.pi * (0.5 - (y + 0.5) / height))
     low, high, haze = (np.array(rgb(code)) for code in ("#dfeaf2", "#2f66b0", "#fbe3c0"))
     tone = np.clip(up, 0, 1)[..., None] ** 0.55
-    colour = low * (1 - tone) + high * tone
+    color = low * (1 - tone) + high * tone
     grain = np.tile(noise(height, 17, 0.2), (1, 2))
     cloud = np.clip(0.8 * (grain - 0.3), 0, 1) * np.clip(3.5 * up, 0, 1) ** 1.5
-    colour = colour + (np.array([1.0, 0.98, 0.95]) - colour) * cloud[..., None]
-    colour = colour + (haze - colour) * (0.55 * np.exp(-np.abs(up) / 0.07))[..., None]
+    color = color + (np.array([1.0, 0.98, 0.95]) - color) * cloud[..., None]
+    color = color + (haze - color) * (0.55 * np.exp(-np.abs(up) / 0.07))[..., None]
     turn = 2 * np.pi * (x + 0.5) / width
     for level, (lift, code) in enumerate(((0.075, "#93a9b5"), (0.045, "#6f8a72"))):
         ridge = lift * (
             1 + 0.45 * np.sin(5 * turn + level) + 0.3 * np.sin(11 * turn + 2 * level) + 0.12 * np.sin(31 * turn)
         )
-        colour = np.where((up < ridge)[..., None], rgb(code), colour)
+        color = np.where((up < ridge)[..., None], rgb(code), color)
     meadow = np.array(rgb("#7c8f5a")) * (0.9 + 0.06 * grain[..., None])
-    colour = np.where(
-        (up < 0)[..., None], meadow + (np.array(rgb("#8fa08c")) - meadow) * np.exp(up / 0.12)[..., None], colour
+    color = np.where(
+        (up < 0)[..., None], meadow + (np.array(rgb("#8fa08c")) - meadow) * np.exp(up / 0.12)[..., None], color
     )
-    return EnvironmentMap.from_panorama(np.clip(colour, 0, 1).astype(np.float32))
+    return EnvironmentMap.from_panorama(np.clip(color, 0, 1).astype(np.float32))
 
 
 def checker(light: str, dark: str, size: int = 256, count: int = 2) -> np.ndarray:

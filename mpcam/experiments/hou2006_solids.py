@@ -51,7 +51,7 @@ def cone(sides: int) -> Solid:
 
 
 def plane(low: Any, high: Any, pieces: int, z: float = 0.0) -> Part:
-    """A level rectangle of 2 pieces^2 triangles; uv in metres."""
+    """A level rectangle of 2 pieces^2 triangles; uv in meters."""
     (x, y), (right, far) = low, high
     corners = np.array([(x, y, z), (right, y, z), (right, far, z), (x, far, z)])
     part = _pieces(corners[[(0, 1, 2), (0, 2, 3)]].astype(float), pieces)
@@ -71,7 +71,7 @@ def _pieces(corners: np.ndarray, count: int) -> np.ndarray:
 
 
 def placed(solid: Solid, place: Any, size: Any, turn: float, pieces: int = 1, soft: float = 0.0) -> Part:
-    """A solid of a size, turned about z, at a place; soft: from 0, flat faces, to 1, an ellipsoid. uv in metres."""
+    """A solid of a size, turned about z, at a place; soft: from 0, flat faces, to 1, an ellipsoid. uv in meters."""
     corners = _pieces(solid[0][solid[1]], pieces)
     normals = np.repeat(
         unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))[:, None], 3, axis=1

@@ -126,7 +126,7 @@ def ray_hits(directions: Reals, corners: Reals) -> NDArray[np.bool_]:
 
 
 def _region(camera: Any, box: Any, lines: Any = ()) -> Region:
-    """A camera's box (and lines) as pixels whose centres lie in it."""
+    """A camera's box (and lines) as pixels whose centers lie in it."""
     size = np.array([camera.width, camera.height])
     low, high = np.stack([*box.low], -1), np.stack([*box.high], -1)
     first = np.clip(np.ceil(np.nan_to_num(low, nan=0) - 0.5), 0, size).astype(np.int64)

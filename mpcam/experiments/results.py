@@ -19,7 +19,7 @@ Row = Mapping[str, Any]
 class Column:
     """A column of a table: key of its cells, heading, unit ("" for none) and meaning.
 
-    group: a heading over several neighbours. paper: the figures are the paper's, not ours. brief: shown on a terminal.
+    group: a heading over several neighbors. paper: the figures are the paper's, not ours. brief: shown on a terminal.
     """
 
     name: str

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from mpcam.experiments.catalogue import EXPERIMENTS
+from mpcam.experiments.catalog import EXPERIMENTS
 from mpcam.experiments.results import Report, Table, shown
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ class BuiltinMesh:
         return tuple(_RECIPES)
 
     def __call__(self, name: str, triangles: int | None = None) -> Mesh:
-        """A mesh made by formula, the same every time. z is up, metres, around the origin.
+        """A mesh made by formula, the same every time. z is up, meters, around the origin.
 
         name: "facade" (a street, default 2,800 triangles of 600 to 4,900), "temple" (columns of long thin triangles,
         4,000 of 2,200 to 100,000), "characters" (people on a plain ground, 177,000 of 25,000 to 2,000,000), "patio"

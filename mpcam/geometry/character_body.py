@@ -36,7 +36,7 @@ _STANDING = [[(0.09, 0.0, 0.92), (0.11, -0.01, 0.5), (0.12, 0.02, 0.1)]] * 2
 
 @dataclass(frozen=True)
 class Look:
-    """Web colours of skin, hair, shirt, trousers or skirt. pose: stand, hips, wave or walk. hat: a colour or none."""
+    """Web colors of skin, hair, shirt, trousers or skirt. pose: stand, hips, wave or walk. hat: a color or none."""
 
     skin: str
     hair: str
@@ -56,7 +56,7 @@ class Sizes:
         self.asked: list[tuple[float, float]] = []
 
     def __call__(self, along: float, around: float) -> tuple[int, int]:
-        """Lines and columns of a part with these sizes in metres, times about 3 where it matters."""
+        """Lines and columns of a part with these sizes in meters, times about 3 where it matters."""
         self.asked.append((along, around))
         return _lines(along * self.resolution), _columns(around * self.resolution)
 

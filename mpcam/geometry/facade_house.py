@@ -72,7 +72,7 @@ class Palette:
 
 
 def house_details(width: float, number: int, rng: np.random.Generator) -> list[Detail]:
-    """The details of one house. width: metres. number: which of the houses it is, it sets colours and turns."""
+    """The details of one house. width: meters. number: which of the houses it is, it sets colors and turns."""
     floors = int(rng.choice([2, 3, 3, 4]))
     bays = max(int(width / 2.7), 2)
     wall = Palette.walls[number % len(Palette.walls)]

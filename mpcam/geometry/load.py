@@ -24,7 +24,7 @@ def load_mesh(path: str | os.PathLike) -> Mesh:
 
     Every face is kept, also those without area; polygons become triangles; several meshes in one file are put together,
     each where its nodes place it, in the file's axes and units. Normals and uv are set where the file has them. Vertex
-    colours and textures become linear (colour numbers of glTF and MTL are linear already). Raises InputError for files
+    colors and textures become linear (color numbers of glTF and MTL are linear already). Raises InputError for files
     that are missing, empty, of another kind, damaged or without faces.
     """
     try:
@@ -117,7 +117,7 @@ def _check_stl(data: bytes) -> None:
 
 
 def _convert(geometry, srgb: bool) -> Mesh:
-    """A trimesh.Trimesh as a Mesh. srgb: vertex colours are encoded so (in glTF they are linear)."""
+    """A trimesh.Trimesh as a Mesh. srgb: vertex colors are encoded so (in glTF they are linear)."""
     visual = geometry.visual
     normals = None
     if "vertex_normals" in geometry._cache.cache:
@@ -142,7 +142,7 @@ def _convert(geometry, srgb: bool) -> Mesh:
     color = np.asarray(color)[:, :3]
     color = color / np.iinfo(color.dtype).max if color.dtype.kind in "iu" else color
     color = linear_from_srgb(color) if srgb else color
-    # colours alone are the colour, not a tint of grey
+    # colors alone are the color, not a tint of gray
     material = Material((1.0, 1.0, 1.0)) if visual.kind != "texture" else material
     if per_face:
         return replace(mesh.flat(), normals=None, colors=np.repeat(color, 3, axis=0), materials=(material,))

@@ -11,8 +11,8 @@ from mpcam.math.srgb import linear_from_srgb
 def linear_texture(image) -> np.ndarray:
     """A PIL image as (H, W, 3) float32 linear RGB, top row first; transparency is ignored."""
     if image.mode.startswith("I"):
-        grey = linear_from_srgb(np.clip(np.asarray(image, dtype=np.float64) / 65535.0, 0.0, 1.0))
-        return np.repeat(grey[:, :, None], 3, axis=2).astype(np.float32)
+        gray = linear_from_srgb(np.clip(np.asarray(image, dtype=np.float64) / 65535.0, 0.0, 1.0))
+        return np.repeat(gray[:, :, None], 3, axis=2).astype(np.float32)
     table = linear_from_srgb(np.arange(256) / 255.0).astype(np.float32)
     return table[np.asarray(image.convert("RGB"))]
 

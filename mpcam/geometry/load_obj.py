@@ -23,7 +23,7 @@ def load_obj(path: Path) -> Mesh:
     """Reads an OBJ file with its materials.
 
     Polygons become fans from their first corner. Without vt and vn, vertices are those of the file in order; with them,
-    one vertex per combination that occurs, in the order of the positions. Vertex colours are taken as sRGB, Kd as
+    one vertex per combination that occurs, in the order of the positions. Vertex colors are taken as sRGB, Kd as
     linear. A missing material or texture file is a warning. Raises InputError, with the line, for what cannot be read.
     """
     text = path.read_bytes().decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ")
@@ -161,7 +161,7 @@ def _columns(rows: list[list[str]], width: int, path: Path, name: str, fill: flo
 
 
 def _positions(rows: list[list[str]], path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """Positions (V, 3) and, where every vertex line has three more numbers, linear colours (V, 3)."""
+    """Positions (V, 3) and, where every vertex line has three more numbers, linear colors (V, 3)."""
     position = _columns(rows, 3, path, "v")
     if not rows or min(len(row) for row in rows) < 6 or any("#" in "".join(row[3:6]) for row in rows):
         return position, None
@@ -184,7 +184,7 @@ def _materials(path: Path, libraries: list[str], names: dict[str, int], material
     for library in libraries:
         file = path.parent / library.replace("\\", "/")
         if not file.is_file():
-            warnings.warn(f"{path}: material file {library} not found; the mesh is grey", stacklevel=4)
+            warnings.warn(f"{path}: material file {library} not found; the mesh is gray", stacklevel=4)
             continue
         known.update(_read_mtl(file))
     materials = [known.get(name, replace(plain, name=name)) for name in names]

@@ -1,4 +1,4 @@
-"""Order along a space-filling curve, so that neighbours in space are neighbours in memory."""
+"""Order along a space-filling curve, so that neighbors in space are neighbors in memory."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ def interleaved(cells: np.ndarray) -> np.ndarray:
 
 
 def nearby(points: np.ndarray) -> np.ndarray:
-    """Numbers of points (N, 3), so that neighbours lie close together; points that are not finite come last."""
+    """Numbers of points (N, 3), so that neighbors lie close together; points that are not finite come last."""
     finite = np.isfinite(points).all(axis=1)
     some = points[finite]
     low, high = (some.min(0), some.max(0)) if len(some) else (np.zeros(3), np.ones(3))

@@ -31,7 +31,7 @@ def sphere(triangles: int) -> Mesh:
 
 
 def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each face into four; new vertices on the unit sphere, shared between neighbours."""
+    """Each face into four; new vertices on the unit sphere, shared between neighbors."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     keys = edges.min(axis=1).astype(np.int64) * len(vertices) + edges.max(axis=1)
     unique, inverse = np.unique(keys, return_inverse=True)
@@ -74,7 +74,7 @@ def cube(triangles: int) -> Mesh:
 def quad_room(triangles: int) -> Mesh:
     """A room 6 x 6 m and 3 m high with its floor at z = 0, seen from inside: 12 n**2 triangles, the nearest.
 
-    Each side has a colour of its own: red and green walls at +x and -x, blue and yellow at +y and -y.
+    Each side has a color of its own: red and green walls at +x and -x, blue and yellow at +y and -y.
     """
     pieces = max(round((triangles / 12) ** 0.5), 1)
     x, y, z = np.diag((6.0, 6.0, 3.0))

@@ -9,7 +9,7 @@ from mpcam.math.srgb import linear_from_srgb
 
 
 def rgb(code: str) -> tuple[float, float, float]:
-    """Linear RGB of a web colour such as "#d9a066"."""
+    """Linear RGB of a web color such as "#d9a066"."""
     red, green, blue = linear_from_srgb(np.array([int(code[k : k + 2], 16) / 255 for k in (1, 3, 5)]))
     return float(red), float(green), float(blue)
 
@@ -33,13 +33,13 @@ def noise(size: int, seed: int, roughness: float = 1.0) -> np.ndarray:
 
 
 def _image(base, shade: np.ndarray) -> np.ndarray:
-    """A colour, or an image of colours, times a brightness per pixel."""
+    """A color, or an image of colors, times a brightness per pixel."""
     base = np.asarray(base, dtype=np.float64)
     return np.clip(base * shade[:, :, None], 0.0, 1.0).astype(np.float32)
 
 
 def plaster(code: str, seed: int, size: int = 128, contrast: float = 0.06) -> np.ndarray:
-    """A rough wall, a lawn or a stone floor: one colour with soft stains and fine grain."""
+    """A rough wall, a lawn or a stone floor: one color with soft stains and fine grain."""
     return _image(rgb(code), 1 + contrast * (noise(size, seed, 0.3) + 0.7 * noise(size, seed + 1, 1.6)))
 
 
@@ -57,7 +57,7 @@ def bricks(code: str, mortar: str, seed: int, rows: int = 16, columns: int = 8, 
 
 
 def tiles(codes: list[str], grout: str, seed: int, count: int = 4, size: int = 256) -> np.ndarray:
-    """Square tiles, count by count, in turn of the given colours along diagonals, with joints."""
+    """Square tiles, count by count, in turn of the given colors along diagonals, with joints."""
     y, x = np.mgrid[0:size, 0:size] / size * count
     row, column = y.astype(int), x.astype(int)
     base = np.array([rgb(code) for code in codes])[(row + column) % len(codes)]
@@ -79,9 +79,9 @@ def cobbles(code: str, gap: str, seed: int, count: int = 9, size: int = 256) -> 
     home = pixel.astype(int)
     distance, tones = [], []
     for step in np.ndindex(3, 3):
-        neighbour = home + np.array(step) - 1
-        wrapped = neighbour % count
-        position = cell[wrapped[..., 0], wrapped[..., 1]] + neighbour - wrapped
+        neighbor = home + np.array(step) - 1
+        wrapped = neighbor % count
+        position = cell[wrapped[..., 0], wrapped[..., 1]] + neighbor - wrapped
         distance.append(np.linalg.norm(pixel - position, axis=2))
         tones.append(tone[wrapped[..., 0], wrapped[..., 1]])
     order = np.argsort(distance, axis=0)

@@ -19,7 +19,7 @@ def read_calibration(path: str | Path, format: str | None = None) -> dict[str, C
 
     format: "colmap" (cameras.txt; names are its numbers, there are no poses), "opencv" (YAML of one camera, no pose),
     "kalibr" (camchain YAML; poses relative to cam0) or "nerfstudio" (transforms.json; names are the frames' file
-    paths); found out from the content if left out. Pixel centres and axes are converted to those of mpcam: centre of
+    paths); found out from the content if left out. Pixel centers and axes are converted to those of mpcam: center of
     the top left pixel at (0.5, 0.5), x right, y down, z forward. Radial and tangential distortion makes a BrownConrady,
     and a Pinhole where all coefficients are zero.
 

@@ -1,4 +1,4 @@
-"""COLMAP's cameras.txt: one line per camera, intrinsics only. Pixel centres are as here."""
+"""COLMAP's cameras.txt: one line per camera, intrinsics only. Pixel centers are as here."""
 
 from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError

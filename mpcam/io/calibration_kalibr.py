@@ -1,6 +1,6 @@
 """Kalibr's camchain: cam0, cam1, ... with intrinsics, and poses from one to the next.
 
-The centre of the first pixel is at (0, 0) there. World is the frame of cam0.
+The center of the first pixel is at (0, 0) there. World is the frame of cam0.
 """
 
 import re

@@ -1,6 +1,6 @@
 """The transforms.json of nerfstudio and instant-ngp: intrinsics, and camera-to-world poses with OpenGL's axes.
 
-Pixel centres are as here. OpenGL's camera axes are x right, y up, z backward.
+Pixel centers are as here. OpenGL's camera axes are x right, y up, z backward.
 """
 
 import json

@@ -1,6 +1,6 @@
 """OpenCV's YAML of one camera: camera_matrix, distortion_coefficients, and what says which model they belong to.
 
-The names are those of OpenCV's calibration programs and of ROS; the centre of the first pixel is at (0, 0) there.
+The names are those of OpenCV's calibration programs and of ROS; the center of the first pixel is at (0, 0) there.
 """
 
 import json

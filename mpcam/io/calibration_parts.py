@@ -12,7 +12,7 @@ from mpcam.errors import InputError
 T = TypeVar("T")
 
 HALF = 0.5
-"""What OpenCV and Kalibr, with (0, 0) at the centre of the first pixel, lack in their principal points."""
+"""What OpenCV and Kalibr, with (0, 0) at the center of the first pixel, lack in their principal points."""
 
 RADTAN = tuple("k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y".split())
 """OpenCV's coefficients in its order: radial and tangential, rational, thin prism, tilted sensor."""

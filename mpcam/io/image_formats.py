@@ -52,7 +52,7 @@ def shared_exponent(path, planes: dict[str, np.ndarray]) -> dict[str, np.ndarray
 
 
 def srgb_encoded(path, planes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """sRGB planes for 8 bits: colours divided by alpha, as these formats keep them. Raises InputError for NaN."""
+    """sRGB planes for 8 bits: colors divided by alpha, as these formats keep them. Raises InputError for NaN."""
     unfit = np.count_nonzero(np.any([np.isnan(plane) for plane in planes.values()], axis=0))
     if unfit:
         total = next(iter(planes.values())).size
@@ -69,7 +69,7 @@ def srgb_encoded(path, planes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def linear(image: StoredImage) -> dict[str, np.ndarray]:
-    """Planes of a file as linear light, colours multiplied by alpha."""
+    """Planes of a file as linear light, colors multiplied by alpha."""
     planes = image.planes
     if not image.linear:
         planes = {

@@ -7,7 +7,7 @@ Which files keep what:
     .hdr                             shared exponent, three channels, finite and not negative
     .png .bmp .tga .jpg .jpeg .ppm   8 bits, sRGB, clipped to [0, 1]
 
-Colour channels in an EXR are R, G, B and A, or Y for one channel. Depth is the channel DEPTH_CHANNEL, "ray.distance":
+Color channels in an EXR are R, G, B and A, or Y for one channel. Depth is the channel DEPTH_CHANNEL, "ray.distance":
 the distance along the ray of the pixel. It is not called Z, since Z means the distance along an optical axis, which
 cameras with rays in all directions do not have. The camera is the string attribute CAMERA_ATTRIBUTE (JSON, exact) and,
 for other programs, the standard attribute worldToCamera in float32. The rays of a ray map are six further channels, see
@@ -41,7 +41,7 @@ def write_image(
 ) -> None:
     """Write linear light to a file; the suffix picks the format, see the table in this module.
 
-    image: (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) floats; the fourth channel is alpha, colours are multiplied
+    image: (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) floats; the fourth channel is alpha, colors are multiplied
     by it. depth: (H, W) distance along each pixel's unit ray, inf where nothing is hit. channels: further (H, W) arrays
     by name, e.g. "normal.X" or "triangle.id"; integers must fit float32 exactly (up to 2**24). camera: any mpcam camera
     of the image's size; of a RayMap, float32 is kept. half: R, G, B, A or Y as 16-bit floats; all else stays float32.
@@ -120,12 +120,12 @@ def _store(path, image: openimageio.StoredImage, kind: str, half: tuple[str, ...
 
 
 def read_image(path) -> np.ndarray:
-    """The colours of an image file: (H, W, C) float32 linear light, C = 1 (grey), 3 (RGB) or 4 (RGBA).
+    """The colors of an image file: (H, W, C) float32 linear light, C = 1 (gray), 3 (RGB) or 4 (RGBA).
 
     Channels are found by name (R, G, B, A, or Y). Files of 8 or 16 bits are taken as sRGB unless they say that they are
-    linear; colours come multiplied by alpha. Pixels of the display window that an EXR holds no data for are 0. Any
+    linear; colors come multiplied by alpha. Pixels of the display window that an EXR holds no data for are 0. Any
     format that OpenImageIO reads is accepted; of several images in a file the first is read. Raises InputError for a
-    file that is missing, unreadable, damaged or without colours.
+    file that is missing, unreadable, damaged or without colors.
     """
     image = openimageio.load(path)
     planes = linear(image)
@@ -145,7 +145,7 @@ def read_image(path) -> np.ndarray:
 def read_channels(path) -> dict[str, np.ndarray]:
     """All channels of the first image of a file by name, each (H, W): float32, or uint32 for integer ids in an EXR.
 
-    Colours of files of 8 or 16 bits come as linear light, as from read_image. Raises InputError as read_image does.
+    Colors of files of 8 or 16 bits come as linear light, as from read_image. Raises InputError as read_image does.
     """
     return linear(openimageio.load(path))
 
@@ -243,7 +243,7 @@ def _check_channel_name(path, name, taken) -> None:
     if not isinstance(name, str) or not name.isprintable() or not 1 <= len(name.encode()) <= 255:
         raise InputError(f"{path}: channel name {name!r:.60}: give 1 to 255 printable characters")
     if name in taken or name in ("R", "G", "B", "A", "Y"):
-        raise InputError(f"{path}: channel name {name!r} is kept for the image's own colours: choose another")
+        raise InputError(f"{path}: channel name {name!r} is kept for the image's own colors: choose another")
 
 
 def _camera_attributes(path, camera, width: int, height: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -20,7 +20,7 @@ _stderr_lock = threading.Lock()
 class StoredImage:
     """What a file holds: planes by channel name, each (H, W) and as stored (integers scaled to [0, 1], EXR ids kept).
 
-    linear: False where the numbers follow the sRGB curve. unassociated: the colours are not multiplied by alpha.
+    linear: False where the numbers follow the sRGB curve. unassociated: the colors are not multiplied by alpha.
     """
 
     planes: dict[str, np.ndarray]
@@ -81,7 +81,7 @@ def store(path, image: StoredImage, kind: str, half: tuple[str, ...] = ()) -> No
             spec.attribute(name, value)
     if not image.linear:
         spec.attribute("oiio:ColorSpace", "sRGB")
-    if Path(path).suffix.lower() in (".jpg", ".jpeg"):  # for looking at: colour at full resolution, few artefacts
+    if Path(path).suffix.lower() in (".jpg", ".jpeg"):  # for looking at: color at full resolution, few artefacts
         spec.attribute("compression", "jpeg:95")
         spec.attribute("jpeg:subsampling", "4:4:4")
     if image.unassociated:
@@ -112,7 +112,7 @@ def _opened(path) -> Iterator[Any]:
     if status.st_size == 0:
         raise InputError(f"{path}: the file is empty: write it again")
     hints = oiio.ImageSpec()
-    # colours as they are in the file: the division by alpha would otherwise be done in 8 bits
+    # colors as they are in the file: the division by alpha would otherwise be done in 8 bits
     hints.attribute("oiio:UnassociatedAlpha", 1)
     with _quiet_stderr():
         file = oiio.ImageInput.open(str(path), hints)

@@ -24,7 +24,7 @@ _SAMPLES = 65  # along each side of an image
 
 
 def default_camera(bounds: np.ndarray, up: str = "z", size: tuple[int, int] = (512, 512)) -> Radial:
-    """A paraboloid camera (180 degrees) outside the bounding box of the meshes that looks at its centre.
+    """A paraboloid camera (180 degrees) outside the bounding box of the meshes that looks at its center.
 
     bounds: (2, 3) smallest and largest coordinates. up: "y" or "z", the vertical axis; the view is from the front, the
     right and above, where the front is -y with z up and +z with y up. size: width, height in pixels.
@@ -113,7 +113,7 @@ def _field_of_view(camera: Camera) -> float:
 
 
 def _overview(bounds: np.ndarray, fov: float, axis: str, up: Any = None) -> np.ndarray:
-    """Pose that looks at the centre of the box from where all of it lies within fov (radians; 0: parallel rays)."""
+    """Pose that looks at the center of the box from where all of it lies within fov (radians; 0: parallel rays)."""
     toward = np.array([0.6, 0.5, 1.0] if axis == "y" else [0.6, -1.0, 0.5])
     toward /= np.linalg.norm(toward)
     center, corners = _box(bounds)
@@ -136,7 +136,7 @@ def _off_axis(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _box(bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centre (3,) and corners (8, 3) relative to it; a unit cube stands for a box that is a point."""
+    """Center (3,) and corners (8, 3) relative to it; a unit cube stands for a box that is a point."""
     center = 0.5 * bounds[0] + 0.5 * bounds[1]
     half = 0.5 * bounds[1] - 0.5 * bounds[0]
     if not half.max() < 1e150:  # whose square would be infinite

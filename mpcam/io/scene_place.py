@@ -1,4 +1,4 @@
-"""Placements and colours as scene files give them."""
+"""Placements and colors as scene files give them."""
 
 import math
 from typing import Any

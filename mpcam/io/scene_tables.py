@@ -1,6 +1,6 @@
 """The tables of a scene file, as typed records; docs of each key are here, checks that need numbers in scene_build.
 
-Angles are in degrees, lengths in scene units, colours linear RGB (one number stands for a grey).
+Angles are in degrees, lengths in scene units, colors linear RGB (one number stands for a gray).
 """
 
 from typing import Annotated, Any, Literal

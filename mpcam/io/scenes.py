@@ -13,7 +13,7 @@ from mpcam.io.scene_tables import CompareTable, SceneTable
 from mpcam.io.scene_text import SceneText
 from mpcam.scene.scene import Scene
 
-_VERTICAL_Z = (".stl",)  # what mesh files of this kind are usually modelled with; the others have y up
+_VERTICAL_Z = (".stl",)  # what mesh files of this kind are usually modeled with; the others have y up
 
 
 @dataclass(frozen=True)

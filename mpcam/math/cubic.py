@@ -140,11 +140,11 @@ def _differentiable(k: tuple[Array, ...], x: Array, exists: Array) -> Array:
 
 
 def determinant_cubic(a: Sequence[Vector], d: Sequence[Vector]) -> tuple[tuple[Array, Array, Array, Array], Array]:
-    """Coefficients of det[a_i + (centre + t) d_i] in t, for three vectors each, and the centre.
+    """Coefficients of det[a_i + (center + t) d_i] in t, for three vectors each, and the center.
 
     Their terms cancel where the vectors are nearly parallel or in one plane, and then they would be lost in rounding
     although the roots are not; so every number here is a pair, of a value and of what rounding took from it (Dekker
-    1971), and only the results are rounded. The centre is 0, or the inflection if all three roots are near it, as they
+    1971), and only the results are rounded. The center is 0, or the inflection if all three roots are near it, as they
     are where rays nearly meet. No vectors of numbers are formed, so components may broadcast.
     """
     e, f = [[[_difference(x, y) for x, y in zip(m[i], m[2], strict=True)] for i in range(2)] for m in (a, d)]
@@ -155,15 +155,15 @@ def determinant_cubic(a: Sequence[Vector], d: Sequence[Vector]) -> tuple[tuple[A
     k1, k2 = _add(_dot(n1, tail_a), _dot(n0, tail_d)), _add(_dot(n2, tail_a), _dot(n1, tail_d))
     spread = absolute(k2[0] * k2[0] - 3 * k1[0] * k3[0])
     near = (spread < k2[0] * k2[0] / 64) & (absolute(k2[0]) < 1e3 * absolute(k3[0]))
-    centre = where(near, -k2[0] / where(near, 3 * k3[0], 1.0), 0.0)
-    shift = (centre, 0.0 * centre)
+    center = where(near, -k2[0] / where(near, 3 * k3[0], 1.0), 0.0)
+    shift = (center, 0.0 * center)
     k2 = _add(k2, _multiply(k3, shift))
     k1 = _add(k1, _multiply(k2, shift))
     k0 = _add(k0, _multiply(k1, shift))
     k2 = _add(k2, _multiply(k3, shift))
     k1 = _add(k1, _multiply(k2, shift))
     k2 = _add(k2, _multiply(k3, shift))
-    return (k0[0], k1[0], k2[0], k3[0]), centre
+    return (k0[0], k1[0], k2[0], k3[0]), center
 
 
 def _sum(x: Array, y: Array) -> Pair:

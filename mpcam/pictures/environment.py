@@ -13,7 +13,7 @@ from mpcam.scene.scene import Scene
 def environment_map(
     scene: Any, position: Any, size: int = 512, shading: str = "light", method: str = "invert", **settings: Any
 ) -> EnvironmentMap:
-    """Colours of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
+    """Colors of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
 
     scene: a Scene, a Mesh or several meshes; its mirror is left out. position (3,): world, away from surfaces. size:
     pixels along a side of each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.

@@ -35,10 +35,10 @@ def _shading(scene: Scene, shading: str, shadows: bool) -> Iterator[Step]:
         return
     lit, unlit = shading == "light", f"shading={shading!r} needs none"
     yield Step("barycentric weights", True, "for what vertices carry")
-    colour = shading != "normal"
-    yield Step("materials", colour, f"{len(mesh.materials)}" if colour else unlit)
+    color = shading != "normal"
+    yield Step("materials", color, f"{len(mesh.materials)}" if color else unlit)
     yield Step(
-        "vertex colours", colour and table.tinted, unlit if not colour else "" if table.tinted else "the mesh has none"
+        "vertex colors", color and table.tinted, unlit if not color else "" if table.tinted else "the mesh has none"
     )
     wants = shading in ("texture", "light")
     has = "the mesh has none" if not table.textured else ""

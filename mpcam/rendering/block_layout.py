@@ -103,7 +103,7 @@ def atlas_layout(atlas: Atlas) -> BlockLayout:
 
 
 def _blocks_of(width: int, height: int, triangle: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """First columns and rows of the blocks, and their groups, neighbours close together.
+    """First columns and rows of the blocks, and their groups, neighbors close together.
 
     triangle: only those that a right triangle along the upper and the left side reaches.
     """

@@ -38,14 +38,14 @@ def face_cameras(camera: Camera, resolution: int, half: bool) -> list[Pinhole]:
     for number in range(5 if half else 6):
         pose = np.eye(4)
         pose[:3, :3] = _AXES[number]
-        size, centre = [resolution, resolution], [0.5 * resolution, 0.5 * resolution]
+        size, center = [resolution, resolution], [0.5 * resolution, 0.5 * resolution]
         if half and number:
             side = 0 if number < 3 else 1
             size[side] = (resolution + 1) // 2
-            centre[side] = 0.5 * resolution if number in (1, 3) else size[side] - 0.5 * resolution
+            center[side] = 0.5 * resolution if number in (1, 3) else size[side] - 0.5 * resolution
         focal = 0.5 * resolution
         pose = pose @ np.asarray(camera.camera_from_world)
-        cameras.append(Pinhole(size[0], size[1], focal, focal, centre[0], centre[1], pose))
+        cameras.append(Pinhole(size[0], size[1], focal, focal, center[0], center[1], pose))
     return cameras
 
 
@@ -75,7 +75,7 @@ class Cubemapped:
     def _check(self, camera: Camera) -> None:
         angle = camera.domain.max_angle
         if camera.ray_geometry != "central" or angle is None:
-            raise InputError(f"method={self.method!r} needs a camera with one centre, not {type(camera).__name__}")
+            raise InputError(f"method={self.method!r} needs a camera with one center, not {type(camera).__name__}")
         if self.half and angle > 0.5 * PI + 1e-9:
             raise InputError(
                 f"method='hemicube' sees 180 degrees, the camera {np.degrees(2 * angle):.0f}: use method='cubemap'"
@@ -177,7 +177,7 @@ def _texel(direction: Any, resolution: int, half: bool) -> Any:
 
 
 def _texel_directions(texel: Any, resolution: int, half: bool) -> Any:
-    """Camera-frame directions (not of unit length) through texel centres."""
+    """Camera-frame directions (not of unit length) through texel centers."""
     import drjit as dr
 
     t = types()

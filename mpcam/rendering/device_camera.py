@@ -118,7 +118,7 @@ class DeviceCamera:
         return samples.central_samples(types(), self.ray.direction, self.ray.valid, *self.size)
 
     @functools.cached_property
-    def centres(self) -> Any:
+    def centers(self) -> Any:
         """Samples of the image plane, for straight-edged triangles."""
         from mpcam_kernels import samples
 

@@ -153,7 +153,7 @@ class GeneralRasterizer:
 
 
 def _ordered(mesh: Mesh, device: DeviceMesh) -> tuple[Any, Any]:
-    """Numbers and corners of the triangles, neighbours together; worked out once for a mesh."""
+    """Numbers and corners of the triangles, neighbors together; worked out once for a mesh."""
     if device.ordered is None:
         with np.errstate(invalid="ignore", over="ignore"):
             order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)

@@ -23,9 +23,9 @@ def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
     from mpcam_kernels import samples
 
     local_ray, t = need(camera, HasRays, "a frame").local_ray, types()
-    centres = samples.pixel_centres(t, camera.width, camera.height)
+    centers = samples.pixel_centers(t, camera.width, camera.height)
     try:
-        ray = local_ray(centres)
+        ray = local_ray(centers)
     except (TypeError, ValueError, AttributeError, RuntimeError, InputError):
         ray = None
     numbers = () if ray is None else (*ray.origin, *ray.direction, ray.valid)
@@ -37,7 +37,7 @@ def pixel_rays(camera: Camera) -> tuple[Ray, np.ndarray]:
         if camera.ray_geometry == "general":
             ray, anchor, far = _anchored(ray)
     if ray is None or far:
-        ray, anchor = _uploaded(local_ray(np.asarray(centres.numpy(), np.float64)), camera)
+        ray, anchor = _uploaded(local_ray(np.asarray(centers.numpy(), np.float64)), camera)
     dr.eval(*ray)  # of a named tuple it would do nothing
     return ray, anchor
 

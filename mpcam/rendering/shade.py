@@ -1,4 +1,4 @@
-"""Colours of first hits: one kernel that gathers what the chosen shading needs, and nothing else."""
+"""Colors of first hits: one kernel that gathers what the chosen shading needs, and nothing else."""
 
 import functools
 import weakref
@@ -92,10 +92,10 @@ def attributes(mesh: Mesh) -> Attributes:
 
 @exclusive
 def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequence[Any] = ()) -> np.ndarray:
-    """Colours of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
+    """Colors of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
 
     scene: the Scene (or Mesh) that the hits were made with; default: the hits' mesh. shading: "color" (material and
-    vertex colour), "texture" (the same times the texture), "normal" (world shading normal towards the viewer, 0.5 +
+    vertex color), "texture" (the same times the texture), "normal" (world shading normal towards the viewer, 0.5 +
     0.5 n), "light" (texture, lit: Lambert's law, both sides, ambient; without lights, one at the viewer). shadows: the
     shadow maps of the scene's lights, in their order (see `shadow_map`), for "light"; default: no shadows. Raises
     InputError for another shading, a scene whose mesh the hits do not belong to, and shadow maps of other lights.
@@ -108,8 +108,8 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequen
             "give the scene that was rasterized"
         )
     check_shadows(shadows, whole, shading)
-    colour = shade_device(hits, whole, shading, shadows)
-    return np.stack([np.asarray(c.numpy()) for c in colour], -1).reshape(hits.camera.height, hits.camera.width, 3)
+    color = shade_device(hits, whole, shading, shadows)
+    return np.stack([np.asarray(c.numpy()) for c in color], -1).reshape(hits.camera.height, hits.camera.width, 3)
 
 
 def check_shading(shading: str) -> None:
@@ -138,16 +138,16 @@ def check_shadows(shadows: Sequence[Any], scene: Scene, shading: str) -> None:
 
 @exclusive
 def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequence[Any] = ()) -> Any:
-    """As `shade`, but the colours stay on the device: an evaluated Array3f, one entry per pixel."""
+    """As `shade`, but the colors stay on the device: an evaluated Array3f, one entry per pixel."""
     import drjit as dr
 
     t = types()
     background = opaque_numbers(list(scene.background))
     if hits.mesh.triangle_count == 0:
         data = {"background": background} | (_environment(hits, scene) if scene.environment is not None else {})
-        colour = _unhit(t, data) + dr.zeros(t.Array3f, dr.width(hits.device_depth))
-        dr.eval(colour)
-        return colour
+        color = _unhit(t, data) + dr.zeros(t.Array3f, dr.width(hits.device_depth))
+        dr.eval(color)
+        return color
     table, weights = attributes(scene.mesh), hits.device_weights
     data: dict[str, Any] = {"faces": table.faces, "background": background}
     if scene.environment is not None:
@@ -203,14 +203,14 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
                 dr.gather(kind, values, corner, hit) * weight for corner, weight in zip(corners, mix, strict=True)
             )
 
-        colour, normal = t.Array3f(1.0), None
+        color, normal = t.Array3f(1.0), None
         if shading != "normal":
             material = dr.gather(t.UInt, data["material"], face, hit)
-            colour = dr.gather(t.Array3f, data["base"], material, hit)
+            color = dr.gather(t.Array3f, data["base"], material, hit)
             if "colors" in data:
-                colour *= mixed(t.Array3f, data["colors"])
+                color *= mixed(t.Array3f, data["colors"])
             if "uv" in data:
-                colour *= _texture(t, data, material, mixed(t.Array2f, data["uv"]), hit)
+                color *= _texture(t, data, material, mixed(t.Array2f, data["uv"]), hit)
         if shading in ("normal", "light"):
             normal = mixed(t.Array3f, data["normals"]) if smooth else dr.gather(t.Array3f, data["normals"], face, hit)
             normal *= dr.rsqrt(dr.maximum(dr.squared_norm(normal), 1e-30))
@@ -218,14 +218,14 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
             back = t.Array3f(*(-(pose[i] * d[0] + pose[3 + i] * d[1] + pose[6 + i] * d[2]) for i in range(3)))
             normal = dr.select(dr.dot(normal, back) < 0, -normal, normal)
             if shading == "normal":
-                colour = 0.5 + 0.5 * normal
+                color = 0.5 + 0.5 * normal
             elif not lights:
-                colour *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
+                color *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
             else:
                 # From what is hit, not along the ray, which may be bent; from the anchor, where float32 is dense.
                 point = mixed(t.Array3f, data["vertices"]) * data["scale"] if "vertices" in data else None
-                colour *= _lit(t, data, lights, normal, point, face, hit)
-        return dr.select(hit, colour, _unhit(t, data))
+                color *= _lit(t, data, lights, normal, point, face, hit)
+        return dr.select(hit, color, _unhit(t, data))
 
     return kernel
 

@@ -112,7 +112,7 @@ def _frozen_place(model: type[Camera], unbounded: bool, level: int) -> Any:
 
 
 def corner(camera: Any, point: Any, depth: Any, unbounded: bool) -> Any:
-    """Pixel and depth of points in the frame of a camera with a centre, as corners of straight-edged triangles.
+    """Pixel and depth of points in the frame of a camera with a center, as corners of straight-edged triangles.
 
     Behind a pinhole there is no image; beyond the rim of a disc there is one, marked by a negative depth.
     """

@@ -89,7 +89,7 @@ class ZBuffered:
             raise InputError(f"the camera has {size} pixels: at most {MOST_PIXELS} along a side are possible")
         self.camera, self.test, self.curved = camera, test, test == "ray_triangle"
         self.device_camera = device_camera(camera)
-        self.samples = self.device_camera.directions if self.curved else self.device_camera.centres
+        self.samples = self.device_camera.directions if self.curved else self.device_camera.centers
         self.pose = self.device.pose(camera.camera_from_world)
 
     def test_for(self, camera: Camera) -> str:

@@ -39,8 +39,8 @@ def scenes(kind: str, rounds: int, seed: int = 0) -> Iterator[tuple[CameraTriang
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     faces = np.arange(3 * FACES).reshape(FACES, 3)
     for _ in range(rounds):
-        centre = rng.normal(size=(FACES, 1, 3))
-        corners = centre + 10 ** rng.uniform(-1, 0.3, (FACES, 1, 1)) * rng.normal(size=(FACES, 3, 3))
+        center = rng.normal(size=(FACES, 1, 3))
+        corners = center + 10 ** rng.uniform(-1, 0.3, (FACES, 1, 1)) * rng.normal(size=(FACES, 3, 3))
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
         vertices = corners.reshape(-1, 3)
@@ -78,12 +78,12 @@ def _triangles(kind: str, rng: np.random.Generator, camera: CameraTriangles) -> 
     second, third = np.where(over, 1 - second, second), np.where(over, 1 - third, third)
     origin, along, _ = camera.ray_at(rng.integers(0, camera.count, TRIANGLES), second, third)
     along = along / np.maximum(np.linalg.norm(along, axis=0), 1e-12)
-    centre = (origin + rng.uniform(-0.5, 4, TRIANGLES) * along).T[:, None]
+    center = (origin + rng.uniform(-0.5, 4, TRIANGLES) * along).T[:, None]
     low, high = (-4, -1.5) if kind == "tiny triangles" else (-2, 0.5)
     size = 10 ** rng.uniform(low, high, (TRIANGLES, 1, 1)) * rng.normal(size=(TRIANGLES, 3, 3))
     if kind == "needles":
         size[:, 2] = size[:, 1] * (1 + 1e-3 * rng.normal(size=(TRIANGLES, 1)))
-    return Mesh((centre + size).reshape(-1, 3), np.arange(3 * TRIANGLES).reshape(-1, 3))
+    return Mesh((center + size).reshape(-1, 3), np.arange(3 * TRIANGLES).reshape(-1, 3))
 
 
 def pairs_that_hit(camera: CameraTriangles, mesh: Mesh) -> int:

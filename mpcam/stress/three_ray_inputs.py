@@ -59,12 +59,12 @@ def _near_fold(rng: np.random.Generator, count: int) -> Inputs:
 
 
 def _pinhole(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    v, centre = _flat(rng, count), np.round(16 * (np.array([0.5, 0.5, -2]) + 0.3 * rng.normal(size=(count, 3)))) / 16
-    return v, v - centre[:, None], centre
+    v, center = _flat(rng, count), np.round(16 * (np.array([0.5, 0.5, -2]) + 0.3 * rng.normal(size=(count, 3)))) / 16
+    return v, v - center[:, None], center
 
 
 def _collapsed(rng: np.random.Generator, count: int) -> Inputs:
-    """The point is the centre, or on a slit: points of the swept triangle, which has no area."""
+    """The point is the center, or on a slit: points of the swept triangle, which has no area."""
     v, d, q = _pinhole(rng, count)
     half = count // 2
     start, along = _lattice(rng, half, 1, 3), _lattice(rng, half, 1, 3)

@@ -17,7 +17,7 @@ def mitsuba_mesh(
     uv: np.ndarray | None = None,
     bsdf: dict[str, Any] | None = None,
 ) -> Any:
-    """A Mitsuba mesh from flat Dr.Jit or (N, 3) NumPy positions and faces; diffuse grey unless a BSDF is given."""
+    """A Mitsuba mesh from flat Dr.Jit or (N, 3) NumPy positions and faces; diffuse gray unless a BSDF is given."""
     flat_positions, flat_faces = _flat(mi.Float, positions), _flat(mi.UInt32, faces)
     counts = (len(flat_positions) // 3, len(flat_faces) // 3)
     properties = mi.Properties()

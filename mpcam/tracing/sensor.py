@@ -23,11 +23,11 @@ _kept: dict[str, Camera] = {}
 
 
 def sensor(
-    camera: Camera, samples: int = 16, *, centred: bool = False, film: dict[str, Any] | None = None
+    camera: Camera, samples: int = 16, *, centered: bool = False, film: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """A Mitsuba dictionary for a camera: the sensor with its film and sampler, to be put into a scene dictionary.
 
-    samples: per pixel. centred: every sample goes through its pixel's centre, as the rasterizer's do. film: other
+    samples: per pixel. centered: every sample goes through its pixel's center, as the rasterizer's do. film: other
     settings of the high dynamic range film (it has a box filter of one pixel, float32, and no alpha by default).
     """
     if not isinstance(camera, Camera):
@@ -49,7 +49,7 @@ def sensor(
     return {
         "type": "mpcam",
         "camera": text,
-        "centred": centred,
+        "centered": centered,
         "film": settings | (film or {}),
         "sampler": {"type": "independent", "sample_count": samples},
     }
@@ -96,7 +96,7 @@ def _sensor_class(mi: Any) -> type:
             if "camera" not in properties:
                 raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.truth.sensor(camera)")
             self.camera = _read(str(properties["camera"]))
-            self.centred = bool(properties.get("centred", False))
+            self.centered = bool(properties.get("centered", False))
             size = self.film().size()
             if (int(size[0]), int(size[1])) != (self.camera.width, self.camera.height):
                 raise InputError(
@@ -107,7 +107,7 @@ def _sensor_class(mi: Any) -> type:
         def _pixel(self, sample: Any) -> Any:
             crop, offset = self.film().crop_size(), self.film().crop_offset()
             u, v = sample.x * float(crop[0]) + float(offset[0]), sample.y * float(crop[1]) + float(offset[1])
-            if self.centred:
+            if self.centered:
                 u = dr.minimum(dr.floor(u), self.camera.width - 1) + 0.5
                 v = dr.minimum(dr.floor(v), self.camera.height - 1) + 0.5
             return mi.Point2f(u, v)
@@ -133,7 +133,7 @@ def _sensor_class(mi: Any) -> type:
             ray = mi.RayDifferential3f(mi.Ray3f(origin, direction, time, wavelengths))
             right, down = self._ray(pixel + mi.Vector2f(1, 0)), self._ray(pixel + mi.Vector2f(0, 1))
             ray.o_x, ray.o_y = right[0], down[0]
-            # A neighbour outside of the view has no ray: no differential there.
+            # A neighbor outside of the view has no ray: no differential there.
             ray.d_x = dr.select(right[2], right[1], direction)
             ray.d_y = dr.select(down[2], down[1], direction)
             ray.has_differentials = True

@@ -57,7 +57,7 @@ function formatTimed(row, column) {
 
 const color = (method) => `var(--${METHODS.includes(method) ? method : "other"})`;
 
-// One shape per method, so that colour is never the only sign. r: radius in pixels.
+// One shape per method, so that color is never the only sign. r: radius in pixels.
 function shape(method, r) {
   const s = r * 0.88, t = r * 1.15, w = r * 0.42;
   switch (method) {

@@ -1,4 +1,4 @@
-// The button that switches between light and dark colours; the choice is remembered where the browser allows it.
+// The button that switches between light and dark colors; the choice is remembered where the browser allows it.
 function startTheme() {
   const button = document.getElementById("theme"), root = document.documentElement;
   const prefersDark = matchMedia("(prefers-color-scheme: dark)");
@@ -7,7 +7,7 @@ function startTheme() {
   const dark = () => (root.dataset.theme ? root.dataset.theme === "dark" : prefersDark.matches);
   const name = () => {
     button.textContent = dark() ? "Light" : "Dark";
-    button.setAttribute("aria-label", `Switch to ${dark() ? "light" : "dark"} colours`);
+    button.setAttribute("aria-label", `Switch to ${dark() ? "light" : "dark"} colors`);
   };
   if (["light", "dark"].includes(stored())) root.dataset.theme = stored();
   button.addEventListener("click", () => {

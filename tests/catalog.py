@@ -40,9 +40,9 @@ NAMES = list(cameras())
 def triangles(count: int, seed: int = 0) -> np.ndarray:
     """(count, 3, 3) random triangles around the origin: tiny to huge, near and far, in front and behind."""
     rng = np.random.default_rng(seed)
-    centre = rng.normal(size=(count, 1, 3))
+    center = rng.normal(size=(count, 1, 3))
     size = 10 ** rng.uniform(-3, 0.8, (count, 1, 1))
-    return centre + size * rng.normal(size=(count, 3, 3))
+    return center + size * rng.normal(size=(count, 3, 3))
 
 
 def soup(count: int, seed: int = 0) -> mp.Mesh:
