@@ -113,9 +113,11 @@ def take(table: Array, index: Array) -> Array:
             table = kind(np.ascontiguousarray(table, np.int32 if whole else np.float32))
         return dr.gather(type(table), table, dr.uint32_array_t(type(index))(index))
     if "jax" in (library(index), library(table)):
-        import jax.numpy as jnp
+        import jax
 
-        return jnp.asarray(table)[index]
+        if library(table) == "numpy":  # the type named: JAX mixes up constants that were float64 in another function
+            table = jax.numpy.asarray(table, jax.dtypes.canonicalize_dtype(table.dtype))
+        return table[index]
     return table[index]
 
 

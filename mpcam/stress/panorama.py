@@ -165,7 +165,7 @@ def narrow_view(distance: float, width: float) -> Panorama:
     return Panorama.equirectangular(VIEW, VIEW, pose(distance), longitude=ends, latitude=ends)
 
 
-def run(triangles: int = 20_000, points: int = 25, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
     """All cases: `points` per kind of point, `triangles` directions per camera. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
 

@@ -18,7 +18,7 @@ _MAPS = 8
 """Maps of each kind."""
 
 
-def run(triangles: int = 20_000, points: int = 200, progress: Progress | None = None) -> list[StressRow]:
+def run(triangles: int = 20_000, points: int = 100, progress: Progress | None = None) -> list[StressRow]:
     """All cases, `points` of each kind. Raises InputError below 1. triangles: not used, since maps bound none."""
     check_counts(triangles=triangles, points=points)
 
