@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from catalog import POSE
+from triangle_cameras import centers
 
 import mpcam as mp
 from mpcam.cameras.serialize import camera_to_json
@@ -89,11 +90,19 @@ def test_everything_takes_it_without_the_register(model, tmp_path):
     assert (tmp_path / "out" / "truth.exr").exists()
 
 
-def test_files_want_it_registered(model, tmp_path, monkeypatch):
-    camera = model(64, 48)
-    for write in (camera_to_json, lambda c: mp.write_image(tmp_path / "a.exr", np.zeros((48, 64)), camera=c)):
-        with pytest.raises(mp.InputError, match=r"has Radial, .*; add yours, mpcam.cameras.MODELS\['Pushbroom'\]"):
-            write(camera)
+def test_an_image_keeps_its_rays(model, tmp_path):
+    """As a ray map, since its class would not be known to a reader."""
+    camera = model(64, 48, camera_from_world=POSE)
+    mp.write_image(tmp_path / "a.exr", np.zeros((48, 64)), camera=camera)
+    kept = mp.read_camera(tmp_path / "a.exr")
+    assert isinstance(kept, mp.RayMap)
+    for part, same in zip(kept.ray(centers(camera)), camera.ray(centers(camera)), strict=True):
+        assert np.allclose(part, same, atol=1e-6)
+
+
+def test_text_wants_it_registered(model, tmp_path, monkeypatch):
+    with pytest.raises(mp.InputError, match=r"has Radial, .*; add yours, mpcam.cameras.MODELS\['Pushbroom'\]"):
+        camera_to_json(model(64, 48))
     scene = tmp_path / "scene.toml"
     scene.write_text('[[mesh]]\nbuiltin = "cube"\n[camera]\nmodel = "pushbroom"\nstep = 0.25\n')
     with pytest.raises(mp.InputError, match='camera.model = "pushbroom": allowed are radial, '):

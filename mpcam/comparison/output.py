@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.cameras.serialize import can_be_written
 from mpcam.comparison import plot, report
 from mpcam.comparison.encode import as_csv, as_dict
 from mpcam.comparison.metrics import flip_map
@@ -101,8 +100,9 @@ def _fill(comparison: Findings, folder: Path) -> None:
     if comparison.truth_image is not None:
         truth = folder / "images" / "truth.png"
         write_image(truth, comparison.truth_image)
-        camera = comparison.camera if can_be_written(comparison.camera) else None
-        write_image(folder / "truth.exr", comparison.truth_image, depth=comparison.truth_depth, camera=camera)
+        write_image(
+            folder / "truth.exr", comparison.truth_image, depth=comparison.truth_depth, camera=comparison.camera
+        )
     errors = {label: magma(values) for label, values in differences(comparison).items()}
     for label, image in comparison.images.items():
         write_image(folder / "images" / f"{names[label]}.png", image)

@@ -44,7 +44,8 @@ def write_image(
     image: (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) floats; the fourth channel is alpha, colors are multiplied
     by it. depth: (H, W) distance along each pixel's unit ray, inf where nothing is hit. channels: further (H, W) arrays
     by name, e.g. "normal.X" or "triangle.id"; integers must fit float32 exactly (up to 2**24). camera: any mpcam camera
-    of the image's size; of a RayMap, float32 is kept. half: R, G, B, A or Y as 16-bit floats; all else stays float32.
+    of the image's size; of a RayMap, float32 is kept, and of a camera that no text can hold (its class is not in the
+    register, its profile is a user's own) its RayMap. half: R, G, B, A or Y as 16-bit floats; all else stays float32.
 
     The file appears whole or not at all, and an older one is kept if writing fails. Raises InputError for wrong shapes
     and types, for what the format cannot keep (NaN in 8 bits, depth or a camera outside EXR), for finite values beyond
@@ -249,13 +250,15 @@ def _check_channel_name(path, name, taken) -> None:
 def _camera_attributes(path, camera, width: int, height: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """What the header says of a camera, and the channels that it needs beside."""
     from mpcam.cameras.ray_map import RayMap
-    from mpcam.cameras.serialize import camera_to_json
+    from mpcam.cameras.serialize import camera_to_json, can_be_written
 
     if (camera.width, camera.height) != (width, height):
         raise InputError(
             f"{path}: the camera is {camera.width}x{camera.height} pixels, the image {width}x{height}: "
             "give the camera that made the image"
         )
+    if not isinstance(camera, RayMap) and not can_be_written(camera):
+        camera = RayMap.of(camera)
     rays = ray_channels(path, camera) if isinstance(camera, RayMap) else {}
     attributes: dict[str, Any] = {CAMERA_ATTRIBUTE: ray_header(camera) if rays else camera_to_json(camera)}
     pose = getattr(camera, "camera_from_world", None)
