@@ -24,7 +24,6 @@ from mpcam.math import (
     isfinite,
     maximum,
     minimum,
-    normalize,
     sqrt,
     vector,
     where,
@@ -107,18 +106,18 @@ def small_outline(
     ]
     low = [minimum(minimum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
     high = [maximum(maximum(images[0][i], images[1][i]), images[2][i]) for i in (0, 1)]
-    area, lengths, bulges = _turn(images[0], images[1], images[2]), [], []
-    # Of directions, since differences of points, if one is much nearer, have little of what the image shows.
-    unit = [normalize(point) for point in points]
+    area, lengths = _turn(images[0], images[1], images[2]), []
+    bulges = []
     for k in range(3):
         after = (k + 1) % 3
         a, b, m0, m1 = points[k], points[after], images[k], images[after]
-        step = vector(*(unit[after][i] - unit[k][i] for i in range(3)))
+        step = vector(*(b[i] - a[i] for i in range(3)))
         g0, g1 = _velocity(focal, a, views[k], step), _velocity(focal, b, views[after], step)
         agreement = g0[0] * g1[0] + g0[1] * g1[1]
         speeds = (g0[0] * g0[0] + g0[1] * g0[1]) * (g1[0] * g1[0] + g1[1] * g1[1])
         sure = sure & ((speeds == 0) | ((agreement > 0) & (agreement * agreement > 0.75 * speeds)))
-        sure = sure & (dot(unit[k], unit[after]) > 0.7)
+        along = dot(a, b)
+        sure = sure & (along > 0) & (along * along > 0.49 * (dot(a, a) * dot(b, b)))
         turn = g0[0] * g1[1] - g0[1] * g1[0]
         chord = vector(m1[0] - m0[0], m1[1] - m0[1])
         length = sqrt(chord[0] * chord[0] + chord[1] * chord[1])
@@ -137,7 +136,7 @@ def small_outline(
         bulges.append((reach * (chord[0] * g0[1] - chord[1] * g0[0]), unknown))
         lengths.append(length)
     # The chords' triangle turned over against the real one: an angle of the image is beyond 180 degrees.
-    volume = dot(unit[0], _cross_of_steps(unit))
+    volume = dot(points[0], _cross_of_steps(points))
     longest = maximum(maximum(lengths[0], lengths[1]), lengths[2])
     lined = (absolute(area) > _SHARP * longest) & (area * where(volume < 0, -1.0, 1.0) > 0)
     side = where(area < 0, -1.0, 1.0)
