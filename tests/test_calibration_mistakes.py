@@ -39,7 +39,7 @@ MISTAKES = [
     ("colmap", "1 PINHOLE 640 480 1 2 x 4\n", ":1: cx: a finite number is needed, got 'x'"),
     ("colmap", "1 PINHOLE 640.5 480 1 2 3 4\n", "the image size is 640.5 x 480"),
     ("colmap", "1 PINHOLE 640 480 -1 2 3 4\n", r":1: Pinhole\(fx=-1"),
-    ("colmap", "1 OPENCV 640 480 1 2 3 4 1e9 0 0 0\n", r":1: BrownConrady\(k=.*: numbers between"),
+    ("colmap", "1 OPENCV 640 480 1 2 3 4 1e31 0 0 0\n", r":1: BrownConrady\(k=.*: numbers between"),
     ("colmap", "1 THIN_PRISM_FISHEYE 640 480 1 2 3 4 0 0 .1 0 0 0 0 0\n", "the distortion p1, p2, .* is not zero"),
     ("opencv", OPENCV, "add fisheye_model: 1 or 0"),
     (

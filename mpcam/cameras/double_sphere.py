@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from mpcam.cameras.base import Camera
 from mpcam.cameras.fields import Limits, Number, Positive, Share
 from mpcam.cameras.spheres import Spheres
-from mpcam.math import PI, Array, maximum, safe_sqrt, where
+from mpcam.math import PI, Array, library, maximum, safe_sqrt, where
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +63,12 @@ class DoubleSphere(Spheres, Camera):
             "double_sphere": cls(*frame, -0.2, 0.59, camera_from_world),
             "center outside": cls(*frame, 1.5, 0.3, camera_from_world, math.radians(115)),
         }
+
+    def _derive(self) -> None:
+        super()._derive()
+        if library(self.xi) == "numpy":
+            object.__setattr__(self, "front", 1 + self.xi)
+            object.__setattr__(self, "back", 1 - self.xi)
 
     def elevation(self, side: Array, ahead: Array) -> Array:
         """xi + ahead, by 1 - |ahead| = side^2 / (1 + |ahead|)."""

@@ -126,13 +126,13 @@ def sign_changes(coefficients: Sequence[float], low: float, high: float) -> list
 def first_true(condition: Callable[[Array], Array], high: Array) -> Array:
     """Where a condition on a JAX array first holds in (0, high], on ever finer grids; high if it never does.
 
-    At most 1e-10 high smaller. Stretches shorter than 1 / 4096 of high may pass unseen.
+    At most 1e-14 high smaller. Stretches shorter than 1 / 4096 of high may pass unseen.
     """
     import jax.numpy as jnp
 
     grid = np.arange(1, _NODES + 1) / _NODES
     start, width = 0.0, high
-    for _ in range(3):
+    for _ in range(4):
         holds = condition(start + width * grid)
         start = start + width * jnp.where(holds.any(), jnp.argmax(holds), _NODES) / _NODES
         width = minimum(width / _NODES, high - start)

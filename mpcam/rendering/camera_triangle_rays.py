@@ -11,15 +11,20 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.math import normalize
 from mpcam.rendering.block_layout import BlockLayout, atlas_layout
+from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.ray_blocks import DeviceRays, bounded, rows_for
 
 
-def camera_triangle_rays(camera: CameraTriangles, scale: float, planes: bool = False) -> DeviceRays:
-    """Rays around the middle of the camera triangles, in a unit; planes: with bounds of images on their planes."""
+def camera_triangle_rays(camera: CameraTriangles, device: DeviceMesh, planes: bool = False) -> DeviceRays:
+    """Rays around the anchor of a mesh, in its unit; planes: with bounds of images on the planes of the triangles.
+
+    With no other shift than the mesh's own, rays that start on one of its faces do so on the device too.
+    """
     t = types()
     layout = atlas_layout(camera.atlas)
     fixed = layout.on_device
-    anchor = np.asarray(camera.vertices, np.float64)[np.unique(camera.faces)].mean(axis=0)
+    pose, scale = np.asarray(camera.camera_from_world, np.float64), device.scale
+    anchor = pose[:3, :3] @ device.anchor + pose[:3, 3]
     frame = np.eye(4)
     frame[:3, 3] = -anchor
     table = corner_rays(camera, frame, scale)

@@ -16,7 +16,7 @@ from mpcam.rendering.ray_blocks import DeviceRays, bounded, family, gathered, ro
 def device_rays(camera: Camera, device: DeviceMesh, planes: bool = False) -> DeviceRays:
     """Rays of a camera in the unit of a device mesh; planes: with what bounds images on planes of camera triangles."""
     if isinstance(camera, CameraTriangles):
-        return camera_triangle_rays(camera, device.scale, planes)
+        return camera_triangle_rays(camera, device, planes)
     return image_rays(device_camera(camera), device.scale)
 
 
