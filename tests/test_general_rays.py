@@ -160,7 +160,7 @@ def test_chunks_give_the_same_frame(monkeypatch):
 
     views = [camera(fields(150, 90)[name]) for name in ("twisted", "panorama")]
     whole = [mp.rasterize(view, SMALL).triangle for view in views]
-    small = {"ROOM": 500, "SPLIT": 300}
+    small = {"ROOM": 500, "SPLIT": 300, "LONG_LIST": 0}
     for walking in (0, 1 << 20):
         general._pipeline.cache_clear()
         with monkeypatch.context() as patch:

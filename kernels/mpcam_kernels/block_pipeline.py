@@ -2,9 +2,9 @@
 
 Balls around clusters of triangles, and around the triangles, meet cones around groups of blocks. Each pair of a group
 and a triangle is one thread, which marks the blocks of the group that no edge excludes. What is left are pairs of a
-block and a triangle; there edges exclude parts of the block. Where triangles are many, those that may cover few pixels
-are finished at once, a thread each; the others go through lists. Nothing is kept from frame to frame but the order of
-the triangles, so scenes move freely.
+block and a triangle; there edges exclude parts of the block. Where triangles are many and small, those that may cover
+few pixels are finished at once, a thread each; the others go through lists. Nothing is kept from frame to frame but the
+order of the triangles, so scenes move freely.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,8 @@ from mpcam_kernels.threads import threads
 
 ROOM = 1 << 20  # pairs of a block and a triangle at a time
 SPLIT = 1 << 19  # pairs of a group and a triangle at a time; each becomes at most GROUP pairs, 8 bytes each
-PIXELS_PER_TRIANGLE = 8  # on the whole; where there are fewer, small triangles are finished by a thread each
+PIXELS_PER_TRIANGLE = 16  # where there are fewer, and lists would be long, a thread each finishes small triangles
+LONG_LIST = 16  # triangles of a block, on average
 RAYS = {"central": central_rays, "general": general_rays}
 
 
@@ -128,8 +129,9 @@ class BlockPipeline:
         Small triangles go onto the canvas at once.
         """
         types, rays = self.types, task.rays
-        walking = task.counts[0] * PIXELS_PER_TRIANGLE > self.blocks * PIXELS
+        tiny = task.counts[0] * PIXELS_PER_TRIANGLE > self.blocks * PIXELS
         for pairs, number in self.pairs(task, setups, levels, tell):
+            walking = tiny and number > LONG_LIST * self.blocks
             for start in range(0, number, ROOM):
                 thread = threads(types, start, min(number, start + ROOM))
                 empty = blocks.room(types, dr.width(thread), self.blocks)

@@ -14,7 +14,7 @@ from mpcam_kernels.regions import Region
 from mpcam_kernels.rows import Rows
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
-SMALL = 48  # slots between the lines that one thread walks by itself
+SMALL = 16  # slots between the lines that one thread walks by itself
 WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 
 
-class Hits:
+class HitKeys:
     """Nearness bits << 32 | inverted triangle number: of surfaces at one depth, the lower number wins."""
 
     name = "hits"
@@ -63,4 +63,4 @@ class Coverage:
         return types.UInt
 
 
-OUTPUTS = {output.name: output for output in (Hits, Depth, Coverage)}
+OUTPUTS = {output.name: output for output in (HitKeys, Depth, Coverage)}

@@ -18,7 +18,7 @@ import drjit as dr
 from mpcam_kernels import blocks, pixels, walk
 from mpcam_kernels.frozen import frozen
 from mpcam_kernels.outputs import OUTPUTS
-from mpcam_kernels.regions import Outline, region
+from mpcam_kernels.regions import PixelOutline, region
 from mpcam_kernels.samples import COARSE, PIXELS, Samples, pixel_of, slot_of
 from mpcam_kernels.samples import blocks as blocks_of
 from mpcam_kernels.threads import threads
@@ -36,19 +36,19 @@ class Pipeline:
     Every array whose length depends on the scene comes in as an argument: a frozen function that makes one itself
     replays the length of the recording.
 
-    outline(camera, rows) gives the `Outline`s of triangles, of which rows[corner][row] holds four numbers each; the
-    first three of a corner's first row are its position. hidden(first) tells from the first rows where triangles are
-    surely not seen. test: module with setup, hit, inside, may_hit, pack and
-    unpack. output: "hits", "depth" or "coverage". cull: "none", or "back" or "front" to leave out the triangles that
-    turn this side to the eye. bounded: test all pixels inside of the outlines and none outside, as papers count them;
-    else, edges drop parts of blocks too. pieces: most outlines of a triangle. count: each frame also counts tests and
-    hits. small: most pixels of a box that one thread walks.
+    outline(camera, rows) gives the `PixelOutline`s of triangles, of which rows[corner][row] holds four numbers each;
+    the first three of a corner's first row are its position. hidden(first) tells from the first rows where triangles
+    are surely not seen. test: module with setup, hit, inside, may_hit, pack and unpack. output: "hits", "depth" or
+    "coverage". cull: "none", or "back" or "front" to leave out the triangles that turn this side to the eye. bounded:
+    test all pixels inside of the outlines and none outside, as papers count them; else, edges drop parts of blocks
+    too. pieces: most outlines of a triangle. count: each frame also counts tests and hits. small: most pixels of a box
+    that one thread walks.
     """
 
     def __init__(
         self,
         types: Any,
-        outline: Callable[..., list[Outline]],
+        outline: Callable[..., list[PixelOutline]],
         hidden: Callable[..., Any],
         test: Any,
         size: tuple[int, int],

@@ -42,7 +42,7 @@ class Items:
     faces: Any
 
 
-def outline(types: Any, bound: str, planes: Planes, face: Any, points: list[Any]) -> tuple[regions.Outline, Any]:
+def outline(types: Any, bound: str, planes: Planes, face: Any, points: list[Any]) -> tuple[regions.PixelOutline, Any]:
     """The outline of triangles, in pixels of the camera triangle (center of the first one at 0.5), and its side."""
     rows = [dr.gather(types.Array4f, row, face) for row in planes.maps]
     places = [[dr.dot(row.xyz, point) + row.w for row in rows] for point in points]
@@ -70,12 +70,12 @@ def outline(types: Any, bound: str, planes: Planes, face: Any, points: list[Any]
     zero, full = types.Array2f(0), types.Array2f(side)
     if bound == "nine_point":
         low, high = dr.select(whole, zero, low + 0.5 - pad), dr.select(whole, full, high + 0.5 + pad)
-        return regions.Outline(low, high, seen, (_all(types),) * 3), side
+        return regions.PixelOutline(low, high, seen, (_all(types),) * 3), side
     lines = []
     for end, normal in zip(ends, normals, strict=True):
         offset = end + 0.5 * (normal.x + normal.y) + pad
         lines.append(dr.select(whole, _all(types), types.Array3f(-normal.x, -normal.y, offset)))
-    return regions.Outline(zero, full, seen, tuple(lines)), side  # pyright: ignore[reportArgumentType]
+    return regions.PixelOutline(zero, full, seen, tuple(lines)), side  # pyright: ignore[reportArgumentType]
 
 
 def _all(types: Any) -> Any:

@@ -13,7 +13,7 @@ EVERYWHERE = (0.0, 0.0, 1.0)
 """The line that keeps every pixel."""
 
 
-class Outline(NamedTuple):
+class PixelOutline(NamedTuple):
     """A region in pixels, not clipped to the image: low, high corners, whether there is any, and three lines."""
 
     low: Any
@@ -58,7 +58,7 @@ class Region(NamedTuple):
         return span
 
 
-def region(types: Any, outline: Outline, width: Any, height: Any) -> tuple[Region, Any]:
+def region(types: Any, outline: PixelOutline, width: Any, height: Any) -> tuple[Region, Any]:
     """The pixels of an outline, widened by what rounding can amount to, and whether there are any.
 
     width, height: numbers, or one Float on the device for squares of several sizes.

@@ -13,7 +13,7 @@ from mpcam.comparison.mirrors import mirror_plan, mirror_rows
 from mpcam.comparison.motion import MOTION, moving_frame, moving_vertices
 from mpcam.comparison.pareto import pareto_front
 from mpcam.comparison.plan import Choice, make_plan
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.comparison.rows import Row
 from mpcam.comparison.table import Comparison
 from mpcam.errors import InputError
@@ -72,7 +72,7 @@ def compare(
         return _mirrored(scene, camera, mirror_plan(methods, settings), repeats, output, progress, shading, moving)
     plan = make_plan(mesh.triangle_count, methods, settings)
     each = 1 + (1 + WARMUP + repeats) * (3 if moving else 2)
-    steps = Steps(progress, 2 + len(plan) * each)
+    steps = StepCounter(progress, 2 + len(plan) * each)
 
     truth = rasterize(camera, mesh, method="raytrace")
     truth_image = np.asarray(shade(truth, scene, shading))
@@ -161,7 +161,7 @@ def _mirrored(
 ) -> Comparison:
     """`compare` for a scene with a mirror."""
     each = 1 + (WARMUP + repeats) * (2 if moving else 1)
-    steps = Steps(progress, 2 + len(plan) * each)
+    steps = StepCounter(progress, 2 + len(plan) * each)
     rows, images, truth = mirror_rows(
         scene,
         camera,

@@ -9,7 +9,7 @@ import numpy as np
 from mpcam.comparison import metrics, timing
 from mpcam.comparison.motion import moving_frame
 from mpcam.comparison.plan import Choice, knob
-from mpcam.comparison.progress import Steps
+from mpcam.comparison.progress import StepCounter
 from mpcam.comparison.rows import Row
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.effects.mirror_methods import MIRROR_METHODS
@@ -52,7 +52,7 @@ def mirror_rows(
     repeats: int,
     warmup: int,
     moving: tuple[np.ndarray, np.ndarray] | None,
-    steps: Steps,
+    steps: StepCounter,
 ) -> tuple[list[Row], dict[str, np.ndarray], np.ndarray]:
     """Rows, their images, and the true image: rays of the true surface, traced by Mitsuba.
 

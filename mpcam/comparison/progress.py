@@ -11,7 +11,7 @@ Progress = Callable[[int, int, str], None]
 """Called as progress(done, total, what) after each step."""
 
 
-class Steps:
+class StepCounter:
     """Counts steps for a progress callback, which may be None."""
 
     def __init__(self, progress: Progress | None, total: int):

@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.decomposition.reflector import Reflector
 from mpcam.decomposition.simplify import simplify
-from mpcam.decomposition.views import View
+from mpcam.decomposition.views import SeenPoints
 
 BEND = 0.5
 """Radii that a difference of 1 between normals counts as."""
@@ -43,7 +43,7 @@ class Coarsening:
     triangles: about how many will be asked for.
     """
 
-    def __init__(self, reflector: Reflector, view: View, triangles: int):
+    def __init__(self, reflector: Reflector, view: SeenPoints, triangles: int):
         self.reflector = reflector
         if reflector.surface is not None:
             start = int(np.clip(_PER_TRIANGLE * triangles, _AT_LEAST, _AT_MOST))
@@ -98,7 +98,7 @@ def _fewer(
 
 
 def _weights(
-    reflector: Reflector, view: View, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray
+    reflector: Reflector, view: SeenPoints, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray
 ) -> np.ndarray:
     """(F,) weights of the errors of faces on the reflector: 1 where the view sees it, and a little around."""
     seen = np.zeros(len(reflector.vertices), bool)

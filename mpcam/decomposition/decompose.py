@@ -10,7 +10,7 @@ from mpcam.checks import whole_number
 from mpcam.decomposition.coarse import Coarse, Coarsening
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shooting import Locator, shoot
-from mpcam.decomposition.views import SLACK, View, on_mesh, view_of
+from mpcam.decomposition.views import SLACK, SeenPoints, on_mesh, view_of
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
@@ -122,7 +122,7 @@ def subdivided(
     )
 
 
-def _seen_part(reflector: Reflector, view: View, triangles: int) -> Coarse:
+def _seen_part(reflector: Reflector, view: SeenPoints, triangles: int) -> Coarse:
     """The coarse mesh of which the eye sees at most so many triangles, as near to that as a few tries come."""
     coarsening = Coarsening(reflector, view, triangles)
     wanted, best, fewest, most = triangles, None, 0, None
@@ -152,7 +152,7 @@ def _seen_part(reflector: Reflector, view: View, triangles: int) -> Coarse:
     return best
 
 
-def seen_triangles(reflector: Reflector, coarse: Coarse, view: View) -> np.ndarray:
+def seen_triangles(reflector: Reflector, coarse: Coarse, view: SeenPoints) -> np.ndarray:
     """(F,) which triangles hold a point of the reflector that the eye sees."""
     place = Locator(coarse.vertices, coarse.normals, coarse.faces).locate(view.points, view.normals)
     seen = np.zeros(len(coarse.faces), bool)

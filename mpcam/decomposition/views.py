@@ -18,7 +18,7 @@ _MOST = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SeenPoints:
     """Points (N, 3) of a reflector that an eye (3,) sees, with their unit normals (N, 3) and faces (N,).
 
     whole: the points are all that matter (a camera's pixels), not samples of what is seen.
@@ -49,7 +49,7 @@ def eye_point(eye: Any) -> np.ndarray:
     return point
 
 
-def view_of(reflector: Reflector, eye: Any) -> View:
+def view_of(reflector: Reflector, eye: Any) -> SeenPoints:
     """All that an eye sees of a reflector, a little more rather than less: for a camera its pixels, else many points.
 
     Raises InputError for an eye that sees nothing or lies on the reflector.
@@ -66,10 +66,10 @@ def view_of(reflector: Reflector, eye: Any) -> View:
         what = f"the eye at {np.round(point, 6).tolist()} sees nothing of the reflector: give another point"
     if len(face) == 0:
         raise InputError(what)
-    return View(point, *reflector.at(face, second, third), face, isinstance(eye, Camera))
+    return SeenPoints(point, *reflector.at(face, second, third), face, isinstance(eye, Camera))
 
 
-def seen_samples(reflector: Reflector, eye: Any, count: int) -> View:
+def seen_samples(reflector: Reflector, eye: Any, count: int) -> SeenPoints:
     """About `count` points that an eye surely sees: even over a camera's pixels, else over the surface's area."""
     point = eye_point(eye)
     _check_off(reflector, point)
@@ -94,7 +94,7 @@ def seen_samples(reflector: Reflector, eye: Any, count: int) -> View:
         points, normals, face = points[keep], normals[keep], face[keep]
     if len(face) == 0:
         raise InputError("the eye sees nothing of the reflector: give another point or camera")
-    return View(point, points, normals, face)
+    return SeenPoints(point, points, normals, face)
 
 
 def surface_samples(reflector: Reflector, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -145,7 +145,7 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
 
     from mpcam_kernels.candidates import CULLING, Candidates
     from mpcam_kernels.frozen import frozen
-    from mpcam_kernels.outputs import Hits
+    from mpcam_kernels.outputs import HitKeys
     from mpcam_kernels.poses import placed
     from mpcam_kernels.rows import Rows
 
@@ -186,7 +186,7 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
         (ball,) = points.at(t, number)
         _, distance, valid = image(face, ball.xyz, rays, True)
         nearness = 1.0 / dr.maximum(distance, 1e-30)
-        dr.scatter_reduce(dr.ReduceOp.Max, keys, Hits.key(t, nearness, face), number, valid)
+        dr.scatter_reduce(dr.ReduceOp.Max, keys, HitKeys.key(t, nearness, face), number, valid)
         return keys
 
     @frozen
@@ -195,7 +195,7 @@ def _kernels(model: type[Camera], unbounded: bool, points: int, backend: str) ->
     ) -> Any:
         t, seen = types(), keys != 0
         (ball,) = points.at(t, number)
-        place, distance, valid = image(dr.select(seen, Hits.triangle(t, keys), 0), ball.xyz, rays, seen)
+        place, distance, valid = image(dr.select(seen, HitKeys.triangle(t, keys), 0), ball.xyz, rays, seen)
         row = corner(camera, placed(types(), pose, place), distance * unit, unbounded)
         row.z = dr.select(seen & valid, row.z, dr.nan)
         dr.scatter(target, row, mapped(order, number))

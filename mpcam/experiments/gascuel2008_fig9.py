@@ -6,7 +6,7 @@ import numpy as np
 
 from mpcam.cameras.change import projected
 from mpcam.comparison import timing
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.experiments.common import (
     CARD,
     PAPER,
@@ -40,7 +40,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     scene = builtin_scene("characters", size, size, triangles=QUICK_TRIANGLES if quick else TRIANGLES)
     camera, mesh = scene.camera, scene.mesh
     bounds, left_out = known_bounds(WANTED)
-    steps = Steps(progress, len(bounds) * (2 + WARMUP + count) + 3)
+    steps = StepCounter(progress, len(bounds) * (2 + WARMUP + count) + 3)
 
     truth = rasterize(camera, mesh, "raytrace")
     prepared = {bound: prepare(camera, mesh, bound=bound) for bound in bounds}

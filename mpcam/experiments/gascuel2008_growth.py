@@ -5,7 +5,7 @@ from typing import Any
 
 from mpcam.comparison import timing
 from mpcam.comparison.motion import moving_frame, moving_vertices
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.experiments.common import CARD, PAPER, STAND_IN, WARMUP, machine, measured, rounds
 from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.gascuel2008_paper import GROWTH
@@ -30,7 +30,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     fixed_triangles, fixed_side = (80, 32) if quick else (FIXED_TRIANGLES, FIXED_SIDE)
     scenes = PAPER_SCENES[:2] if quick else PAPER_SCENES
     each = len(METHODS) * (1 + 2 * (1 + WARMUP + count))
-    steps = Steps(progress, (len(triangles) + len(sides)) * each + len(scenes) * (2 + WARMUP + count))
+    steps = StepCounter(progress, (len(triangles) + len(sides)) * each + len(scenes) * (2 + WARMUP + count))
 
     known: dict[tuple[int, int], dict[str, Any]] = {}
     left_out: list[str] = []
@@ -75,7 +75,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     )
 
 
-def _measured(triangles: int, side: int, count: int, steps: Steps, left_out: list[str]) -> dict[str, Any]:
+def _measured(triangles: int, side: int, count: int, steps: StepCounter, left_out: list[str]) -> dict[str, Any]:
     """Times and peak memory at one number of triangles and one size of image; what fails goes to `left_out`."""
     scene = wavy_sphere(triangles, side)
     positions = moving_vertices(scene.mesh)
@@ -98,7 +98,7 @@ def _measured(triangles: int, side: int, count: int, steps: Steps, left_out: lis
     return row
 
 
-def _paper_scenes(scenes: tuple[tuple[str, int], ...], side: int, count: int, steps: Steps) -> Rows:
+def _paper_scenes(scenes: tuple[tuple[str, int], ...], side: int, count: int, steps: StepCounter) -> Rows:
     """Shaded frames at the paper's four numbers of triangles."""
     calls: dict[str, Callable[[], object]] = {}
     rows: Rows = []

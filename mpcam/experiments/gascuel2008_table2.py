@@ -8,7 +8,7 @@ import numpy as np
 
 from mpcam.cameras.change import projected, resized
 from mpcam.comparison import timing
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.experiments.common import (
     CARD,
     PAPER,
@@ -38,7 +38,7 @@ REFERENCE = {PARABOLOIDS: CUBE, PARABOLOID: HEMICUBE, SPHERE: HEMICUBE, LAMBERT:
 
 
 @dataclass(frozen=True)
-class Case:
+class ViewSet:
     """One set of views with one output, ready to be run."""
 
     size: int
@@ -75,7 +75,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     scene = builtin_scene("facade", sizes[0], sizes[0], triangles=TRIANGLES)
     sets = {size: view_sets(scene, size) for size in sizes}
     number = sum(len(views) for views in sets.values())
-    steps = Steps(progress, number * (len(OUTPUTS) * (2 + WARMUP + count) + 1) + 1)
+    steps = StepCounter(progress, number * (len(OUTPUTS) * (2 + WARMUP + count) + 1) + 1)
 
     cases, wrong = [], {}
     for size, views in sets.items():
@@ -86,7 +86,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
             for output in OUTPUTS:
                 kind = "hits" if output == "color" else output
                 prepared = tuple(prepare(camera, scene.mesh, output=kind) for camera in cameras)
-                cases.append(Case(size, name, output, prepared, scene))
+                cases.append(ViewSet(size, name, output, prepared, scene))
                 off = sum(mismatch(view.frame(), truth) for view, truth in zip(prepared, truths, strict=True))
                 wrong[size, name, output] = 100 * off / pixels
                 steps.done(f"{name} {size}")

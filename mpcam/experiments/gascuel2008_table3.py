@@ -8,7 +8,7 @@ import numpy as np
 
 from mpcam.cameras.change import projected, resized
 from mpcam.comparison import timing
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.effects.shadows import ShadowMap, shadow_maps
 from mpcam.experiments import gascuel2008_paper as paper
 from mpcam.experiments.common import (
@@ -71,7 +71,7 @@ def plan(quick: bool) -> list[Choice]:
     return chosen
 
 
-class Case:
+class PreparedRow:
     """A row made ready: what it renders with, and what is counted. maps: the shadow maps of the scene's lights."""
 
     def __init__(self, choice: Choice, scene: Scene, size: int, maps: tuple[ShadowMap, ...]):
@@ -117,19 +117,19 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     """Run the experiment; see `mpcam.experiments.run`."""
     size, count = (256 if quick else SIZE), rounds(repeats, quick, ROUNDS)
     choices = plan(quick)
-    steps = Steps(progress, len(choices) * (1 + len(MODES) * (1 + WARMUP + count)) + 1)
+    steps = StepCounter(progress, len(choices) * (1 + len(MODES) * (1 + WARMUP + count)) + 1)
 
     scenes: dict[tuple[str, int], Scene] = {}
     maps: dict[tuple[str, int], tuple[ShadowMap, ...]] = {}
     truths: dict[Any, Any] = {}
-    cases: list[Case] = []
+    cases: list[PreparedRow] = []
     rows: list[dict[str, Any]] = []
     for choice in choices:
         key = (choice.scene, choice.triangles)
         if key not in scenes:
             scenes[key] = builtin_scene(choice.scene, size, size, triangles=choice.triangles)
             maps[key] = shadow_maps(scenes[key], SHADOW_SIZE)
-        case = Case(choice, scenes[key], size, maps[key])
+        case = PreparedRow(choice, scenes[key], size, maps[key])
         view = (*key, choice.projection)
         if view not in truths:
             truths[view] = rasterize(case.camera, scenes[key].mesh, "raytrace")

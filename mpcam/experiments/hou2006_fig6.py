@@ -10,7 +10,7 @@ from mpcam.comparison.metrics import flip_map, image_rmse, psnr
 from mpcam.comparison.mirrors import FINE
 from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.pareto import pareto_front
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.decomposition.decompose import decompose
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.effects.reflection import Reflection
@@ -58,7 +58,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     count = rounds(repeats, quick, ROUNDS)
     sizes = SIZES[:3:2] if quick else SIZES
     number = 1 + len(sizes) + len(_halvings(quick)) + len(_levels(quick))
-    steps = Steps(progress, len(SHAPES) * (1 + number * (1 + 2 * (1 + WARMUP + count))) + 1)
+    steps = StepCounter(progress, len(SHAPES) * (1 + number * (1 + 2 * (1 + WARMUP + count))) + 1)
     rows: list[dict[str, Any]] = []
     shown: dict[str, list[MirrorPicture]] = {}
     for shape in SHAPES:
@@ -106,7 +106,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps: Steps) -> list[MirrorPicture]:
+def _shown(shape: str, scene: Scene, sizes: tuple[int, ...], quick: bool, steps: StepCounter) -> list[MirrorPicture]:
     """The mirror by every method, the truth first."""
     assert scene.mirror is not None
     maps = shadow_maps(scene, 256 if quick else 2048)
@@ -156,7 +156,7 @@ def edge_length(cams: CameraTriangles) -> float:
     return float(np.sqrt(np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=-1).mean()))
 
 
-def _time(shown: list[MirrorPicture], scene: Scene, count: int, steps: Steps) -> None:
+def _time(shown: list[MirrorPicture], scene: Scene, count: int, steps: StepCounter) -> None:
     """Put the times of still and moving pictures into the rows, and which rows are on the front."""
     calls = {f"{i} still": one.picture.frame for i, one in enumerate(shown)}
     mirror = shown[0].row["mirror"]

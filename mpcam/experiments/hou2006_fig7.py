@@ -8,7 +8,7 @@ import numpy as np
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
 from mpcam.comparison.motion import moving_frame
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.decomposition.decompose import decompose
 from mpcam.effects.reflection import Reflection
 from mpcam.effects.shadows import shadow_maps
@@ -37,7 +37,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     few = sum(size == MANY for size, _ in sizes)
     per_row = 1 + len(CULLING) * full + (1 + WARMUP + number["tight"])
     per_many = 1 + 2 * (1 + WARMUP + number["tight"])
-    steps = Steps(progress, 1 + (len(sizes) - few) * per_row + few * per_many + 1)
+    steps = StepCounter(progress, 1 + (len(sizes) - few) * per_row + few * per_many + 1)
     eye = TeapotScene(40).scene.camera
     shape = teapot(24 if quick else 96)
     cams = {
@@ -77,7 +77,9 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def _row(triangles: int, cams: CameraTriangles, wanted: int, number: dict[str, int], steps: Steps) -> dict[str, Any]:
+def _row(
+    triangles: int, cams: CameraTriangles, wanted: int, number: dict[str, int], steps: StepCounter
+) -> dict[str, Any]:
     """One number of scene and of camera triangles: counts, then times."""
     whole = TeapotScene(triangles)
     mesh = whole.scene.mesh

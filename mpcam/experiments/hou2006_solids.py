@@ -9,7 +9,7 @@ import numpy as np
 
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.plain import sphere
-from mpcam.geometry.shapes import Part, unit
+from mpcam.geometry.shapes import MeshPart, unit
 
 Solid = tuple[np.ndarray, np.ndarray]
 
@@ -50,14 +50,14 @@ def cone(sides: int) -> Solid:
     return corners, np.array([(i, (i + 1) % sides, sides) for i in range(sides)])
 
 
-def plane(low: Any, high: Any, pieces: int, z: float = 0.0) -> Part:
+def plane(low: Any, high: Any, pieces: int, z: float = 0.0) -> MeshPart:
     """A level rectangle of 2 pieces^2 triangles; uv in meters."""
     (x, y), (right, far) = low, high
     corners = np.array([(x, y, z), (right, y, z), (right, far, z), (x, far, z)])
     part = _pieces(corners[[(0, 1, 2), (0, 2, 3)]].astype(float), pieces)
     flat = part.reshape(-1, 3)
     up = np.broadcast_to((0.0, 0.0, 1.0), flat.shape)
-    return Part(flat, np.arange(len(flat)).reshape(-1, 3), up, flat[:, :2])
+    return MeshPart(flat, np.arange(len(flat)).reshape(-1, 3), up, flat[:, :2])
 
 
 def _pieces(corners: np.ndarray, count: int) -> np.ndarray:
@@ -70,7 +70,7 @@ def _pieces(corners: np.ndarray, count: int) -> np.ndarray:
     return np.einsum("pkc,fcx->fpkx", weights, corners).reshape(-1, 3, 3)
 
 
-def placed(solid: Solid, place: Any, size: Any, turn: float, pieces: int = 1, soft: float = 0.0) -> Part:
+def placed(solid: Solid, place: Any, size: Any, turn: float, pieces: int = 1, soft: float = 0.0) -> MeshPart:
     """A solid of a size, turned about z, at a place; soft: from 0, flat faces, to 1, an ellipsoid. uv in meters."""
     corners = _pieces(solid[0][solid[1]], pieces)
     normals = np.repeat(
@@ -89,7 +89,9 @@ def placed(solid: Solid, place: Any, size: Any, turn: float, pieces: int = 1, so
     c, s = np.cos(turn), np.sin(turn)
     matrix = np.array([(c, -s, 0), (s, c, 0), (0, 0, 1)])
     points = (corners @ matrix.T + place).reshape(-1, 3)
-    return Part(points, np.arange(len(points)).reshape(-1, 3), (normals @ matrix.T).reshape(-1, 3), uv.reshape(-1, 2))
+    return MeshPart(
+        points, np.arange(len(points)).reshape(-1, 3), (normals @ matrix.T).reshape(-1, 3), uv.reshape(-1, 2)
+    )
 
 
 def _smoothed(corners: np.ndarray) -> np.ndarray:

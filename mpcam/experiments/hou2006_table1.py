@@ -8,7 +8,7 @@ import numpy as np
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import timing
 from mpcam.comparison.motion import moving_frame, moving_vertices
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.decomposition.decompose import decompose, subdivided
 from mpcam.experiments import hou2006_paper as paper
 from mpcam.experiments.common import RENDERED, WARMUP, WRONG, machine, measured, mismatch, rounds, wrong_pixels
@@ -66,7 +66,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     """Run the experiment; see `mpcam.experiments.run`."""
     count = rounds(repeats, quick, ROUNDS)
     number = 5 if quick else 7
-    steps = Steps(progress, number * (1 + len(BOUNDS) + 2 * (len(BOUNDS) + 1) * (1 + WARMUP + count)) + 1)
+    steps = StepCounter(progress, number * (1 + len(BOUNDS) + 2 * (len(BOUNDS) + 1) * (1 + WARMUP + count)) + 1)
     rows: list[dict[str, Any]] = []
     chosen = cases(quick)
     for case in chosen:
@@ -111,7 +111,9 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     return report
 
 
-def _counted(case: ThroughTriangles, steps: Steps) -> tuple[list[dict[str, Any]], dict[str, Callable[[], object]]]:
+def _counted(
+    case: ThroughTriangles, steps: StepCounter
+) -> tuple[list[dict[str, Any]], dict[str, Callable[[], object]]]:
     """A row of counts for each bound, and what is to be timed."""
     mesh, cams = case.scene.mesh, case.cams
     positions = moving_vertices(mesh)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from mpcam.comparison import timing
-from mpcam.comparison.progress import Progress, Steps
+from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.inner_loop import measure_loop
 from mpcam.experiments.moving_scene import wavy_sphere
@@ -55,7 +55,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     scenes = [wavy_sphere(80 if quick else SPHERE, size)]
     scenes += [builtin_scene(name, size, size) for name in (BUILT_IN[:1] if quick else BUILT_IN)]
     names = [ALL, *EXPECTED]
-    steps = Steps(progress, len(scenes) * len(names) * (1 + WARMUP + count) + 1)
+    steps = StepCounter(progress, len(scenes) * len(names) * (1 + WARMUP + count) + 1)
     times: dict[str, dict[str, float]] = {}
     for scene in scenes:
         calls = {name: _frame(scene, name) for name in names}
@@ -98,12 +98,12 @@ def _frame(scene: Scene, without: str) -> Callable[[], object]:
     from mpcam.rendering import outlines
     from mpcam.rendering.z_buffer import kernel_test
     from mpcam_kernels.pipeline import SMALL, Pipeline
-    from mpcam_kernels.regions import Outline
+    from mpcam_kernels.regions import PixelOutline
 
-    def boxes(camera: Any, rows: list[list[Any]]) -> list[Outline]:
-        return [Outline(*without_lines(outline)) for outline in outlines.tight(camera, rows)]  # pyright: ignore[reportArgumentType]
+    def boxes(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
+        return [PixelOutline(*without_lines(outline)) for outline in outlines.tight(camera, rows)]  # pyright: ignore[reportArgumentType]
 
-    def from_positions(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+    def from_positions(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
         views = [camera.local_vertex_view(row[0].xyz) for row in rows]
         four = type(rows[0][0])
         places = [four(*row[0].xyz, lens.place) for row, lens in zip(rows, views, strict=True)]

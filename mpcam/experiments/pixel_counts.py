@@ -18,7 +18,7 @@ Numbers = NDArray[np.int64]
 Reals = NDArray[np.float64]
 
 
-class Region(NamedTuple):
+class PixelRegion(NamedTuple):
     """Pixels that a bound leaves of each of F triangles: a box, and lines (F, 3) whose positive sides it lies on.
 
     first, last: (F, 2), the first pixels and those after the last; the same where there is no region. squares: (F,),
@@ -37,7 +37,7 @@ def local_corners(camera: Any, mesh: Any) -> Reals:
     return np.asarray(mesh.corners, np.float64) @ pose[:3, :3].T + pose[:3, 3]
 
 
-def regions(camera: Any, corners: Reals, bound: str) -> list[Region]:
+def regions(camera: Any, corners: Reals, bound: str) -> list[PixelRegion]:
     """What a bound ("tight", "quad" or "triangle") of a radial camera leaves; "triangle" gives up to four parts."""
     points = [np.moveaxis(corners[:, i], -1, 0) for i in range(3)]
     with np.errstate(all="ignore"):
@@ -51,7 +51,7 @@ def regions(camera: Any, corners: Reals, bound: str) -> list[Region]:
         everywhere = np.array([0.0, 0.0, 1.0])
         kept = np.asarray(sure)[:, None]  # the others are large
         return [
-            Region(
+            PixelRegion(
                 np.where(kept, fine.first, rough.first),
                 np.where(kept, fine.last, rough.last),
                 tuple(np.where(kept, line, everywhere) for line in fine.lines),
@@ -91,7 +91,7 @@ def in_squares(camera: Any, triangle: Numbers, pixel: Numbers) -> Numbers:
     return whole[: camera.height, : camera.width].ravel()
 
 
-def pairs(camera: Any, region: Region) -> Iterator[tuple[Numbers, Numbers]]:
+def pairs(camera: Any, region: PixelRegion) -> Iterator[tuple[Numbers, Numbers]]:
     """Triangles and the pixels (row by row numbers) in their regions, in chunks."""
     widths, areas = region.last[:, 0] - region.first[:, 0], (region.last - region.first).prod(-1)
     filled = np.flatnonzero(areas)
@@ -125,11 +125,11 @@ def ray_hits(directions: Reals, corners: Reals) -> NDArray[np.bool_]:
     return ahead & ((sides >= 0).all(0) | (sides <= 0).all(0))
 
 
-def _region(camera: Any, box: Any, lines: Any = ()) -> Region:
+def _region(camera: Any, box: Any, lines: Any = ()) -> PixelRegion:
     """A camera's box (and lines) as pixels whose centers lie in it."""
     size = np.array([camera.width, camera.height])
     low, high = np.stack([*box.low], -1), np.stack([*box.high], -1)
     first = np.clip(np.ceil(np.nan_to_num(low, nan=0) - 0.5), 0, size).astype(np.int64)
     last = np.clip(np.floor(np.nan_to_num(high, nan=1e9) + 0.5), 0, size).astype(np.int64)
     last = np.where(np.asarray(box.valid)[:, None], np.maximum(last, first), first)
-    return Region(first, last, tuple(np.stack(np.broadcast_arrays(*line), -1) for line in lines))
+    return PixelRegion(first, last, tuple(np.stack(np.broadcast_arrays(*line), -1) for line in lines))

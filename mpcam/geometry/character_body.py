@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpcam.geometry.mesh import Material
-from mpcam.geometry.shapes import Part, ellipsoid, join, loft, smooth_curve, unit
+from mpcam.geometry.shapes import MeshPart, ellipsoid, join, loft, smooth_curve, unit
 from mpcam.geometry.textures import painted
 
-Pieces = list[tuple[Part, Material]]
+Pieces = list[tuple[MeshPart, Material]]
 
 # shoulder, elbow and wrist of the left arm (x > 0), then of the right arm with x mirrored
 _ARMS = {
@@ -122,7 +122,7 @@ def _tube(
     ripple: Callable | None = None,
     caps: tuple[float, float] = (1.0, 1.0),
     across=(1.0, 0.0, 0.0),
-) -> Part:
+) -> MeshPart:
     """A closed tube through knots of x, y, z, half-width, half-depth (K, 5).
 
     caps: how far the rounded ends reach, in radii. ripple(v, angle): factors on the radius, v from 0 to 1 along it.
@@ -190,11 +190,11 @@ def _folds(v, angle):
     return 1 + 0.09 * (1 - v) ** 1.5 * np.sin(11 * angle) + 0.03 * (1 - v) * np.sin(5 * angle + 1)
 
 
-def _torso(sizes: Sizes) -> Part:
+def _torso(sizes: Sizes) -> MeshPart:
     return _tube(sizes, _TORSO, 0.55, 0.45, power=2.4, caps=(0.2, 0.2))
 
 
-def _hair(sizes: Sizes, long: bool) -> Part:
+def _hair(sizes: Sizes, long: bool) -> MeshPart:
     """A cap behind the face, down to the shoulders if long."""
     return _tube(sizes, _LONG_HAIR if long else _SHORT_HAIR, 0.36, 0.5, ripple=_strands, caps=(0.6, 0.6))
 
@@ -225,14 +225,14 @@ def _mirrored(joints, side: int) -> np.ndarray:
     return np.array(joints) * (side, 1.0, 1.0)
 
 
-def _leg(sizes: Sizes, joints, side: int) -> Part:
+def _leg(sizes: Sizes, joints, side: int) -> MeshPart:
     hip, knee, ankle = _mirrored(joints, side)
     places = [ankle, 0.2 * knee + 0.8 * ankle, 0.65 * knee + 0.35 * ankle, knee, 0.5 * (hip + knee), hip]
     widths = [(0.034, 0.038), (0.036, 0.04), (0.058, 0.066), (0.056, 0.062), (0.078, 0.088), (0.09, 0.1)]
     return _tube(sizes, np.concatenate([places, widths], axis=1), 0.5, 0.32, caps=(0.5, 0.5))
 
 
-def _shoe(sizes: Sizes, joints, side: int) -> Part:
+def _shoe(sizes: Sizes, joints, side: int) -> MeshPart:
     """An ellipsoid with a flat sole."""
     ankle = _mirrored(joints, side)[2]
     lines, columns = sizes(0.16, 0.24)
@@ -240,10 +240,10 @@ def _shoe(sizes: Sizes, joints, side: int) -> Part:
     points = part.vertices.copy()
     points[:, 2] = np.where(points[:, 2] < -0.035, -0.035 + 0.15 * (points[:, 2] + 0.035), points[:, 2])
     points += (ankle[0], ankle[1] - 0.055, ankle[2] - 0.1 - points[:, 2].min() + 0.002)
-    return Part(points, part.faces, part.normals, part.uv)
+    return MeshPart(points, part.faces, part.normals, part.uv)
 
 
-def _arm(sizes: Sizes, joints, side: int) -> tuple[Part, Part]:
+def _arm(sizes: Sizes, joints, side: int) -> tuple[MeshPart, MeshPart]:
     """The sleeve, and the forearm with hand and fingers."""
     shoulder, elbow, wrist = _mirrored(joints, side)
     across = (0.0, 1.0, 0.2)
@@ -259,7 +259,7 @@ def _arm(sizes: Sizes, joints, side: int) -> tuple[Part, Part]:
     return sleeve, join([bare, *_hand(sizes, wrist, along, side)])
 
 
-def _hand(sizes: Sizes, wrist, along, side: int) -> list[Part]:
+def _hand(sizes: Sizes, wrist, along, side: int) -> list[MeshPart]:
     """A palm, four fingers and a thumb, pointing along the forearm, the thumb forward."""
     thumb = np.array((0.0, -1.0, 0.0)) + along[1] * along
     thumb = unit(thumb)

@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.geometry.facade_house import Detail, house_details
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.shapes import Builder, Part, boxes, copies, join, lathe, moved, quads
+from mpcam.geometry.shapes import Builder, MeshPart, boxes, copies, join, lathe, moved, quads
 from mpcam.geometry.textures import cobbles, painted, plaster, textured, tiles
 
 _ROAD = 3.6  # half the width of the carriageway
@@ -39,7 +39,7 @@ def _street() -> list[Detail]:
     pavement = textured("pavement", tiles(["#b9b2a6", "#ada698"], "#77716a", 12))
     kerb = painted("kerb", "#9a958c")
 
-    def floor(x0, y0, x1, y1, z=0.0, scale=1.8) -> Part:
+    def floor(x0, y0, x1, y1, z=0.0, scale=1.8) -> MeshPart:
         corners = np.array([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])
         return quads(corners, corners[:, :2] / scale)
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpcam.geometry.mesh import Material
-from mpcam.geometry.shapes import Part, boxes, copies, join, quads
+from mpcam.geometry.shapes import MeshPart, boxes, copies, join, quads
 from mpcam.geometry.textures import bricks, door, painted, planks, plaster, roof_tiles, textured, window
 
-Pieces = list[tuple[Part, Material]]
+Pieces = list[tuple[MeshPart, Material]]
 
 _DEPTH = 9.0
 _GROUND, _FLOOR = 3.5, 3.0  # heights of the ground floor and of those above
@@ -133,7 +133,7 @@ def _shell(width, height, ridge, wall, roof) -> Pieces:
         points = np.array([(x, -_DEPTH, height), (x, 0, height), (x, middle, ridge)])
         normal = np.tile((towards, 0.0, 0.0), (3, 1))
         faces = np.array([[0, 1, 2]]) if towards > 0 else np.array([[0, 2, 1]])
-        walls.append(Part(points, faces, normal, points[:, 1:] / scale))
+        walls.append(MeshPart(points, faces, normal, points[:, 1:] / scale))
     slope = np.hypot(ridge - height, _DEPTH / 2) / scale
     uv = np.array([(0, 0), (width / scale, 0), (width / scale, slope), (0, slope)])
     front = [(width, 0, height), (0, 0, height), (0, middle, ridge), (width, middle, ridge)]
@@ -141,7 +141,7 @@ def _shell(width, height, ridge, wall, roof) -> Pieces:
     return [(join(walls), wall), (quads([front, back], uv), roof)]
 
 
-def _upright(start, end, bottom, top, scale, flip=False) -> Part:
+def _upright(start, end, bottom, top, scale, flip=False) -> MeshPart:
     """A wall quad on the line from start to end (x, y), seen from its left side; flip: from its right side."""
     (x0, y0), (x1, y1) = (end, start) if flip else (start, end)
     length = np.hypot(x1 - x0, y1 - y0) / scale
@@ -149,7 +149,7 @@ def _upright(start, end, bottom, top, scale, flip=False) -> Part:
     return quads([[(x1, y1, bottom), (x0, y0, bottom), (x0, y0, top), (x1, y1, top)]], uv)
 
 
-def _front(rectangles, y: float) -> Part:
+def _front(rectangles, y: float) -> MeshPart:
     """Rectangles (x0, z0, x1, z1) in the plane of that y, seen from +y; uv along the wall, 2 m per tile."""
     r = np.atleast_2d(np.asarray(rectangles, dtype=np.float64))
     x = r[:, [2, 0, 0, 2]]
@@ -163,7 +163,10 @@ def _panes(holes, y: float, panes) -> Pieces:
     for hole, material in zip(holes, panes, strict=True):
         part = _front(hole, y)
         pieces.append(
-            (Part(part.vertices, part.faces, part.normals, np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)), material)
+            (
+                MeshPart(part.vertices, part.faces, part.normals, np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)),
+                material,
+            )
         )
     return pieces
 
@@ -183,7 +186,7 @@ def _deep_storey(width, bottom, top, holes, panes, wall) -> Pieces:
     high = np.stack([holes[:, 2], np.zeros(len(holes)), holes[:, 3]], axis=1)
     # the inside of a box: its sides turned round
     reveal = boxes(low, high, "xXzZ")
-    reveal = Part(reveal.vertices, reveal.faces[:, [0, 2, 1]], -reveal.normals, reveal.uv)
+    reveal = MeshPart(reveal.vertices, reveal.faces[:, [0, 2, 1]], -reveal.normals, reveal.uv)
     return [(_front(solid, 0.0), wall), (reveal, Palette.stone), *_panes(holes, -_RECESS, panes)]
 
 
@@ -231,7 +234,7 @@ def _roof_details(width, height, ridge, glass, wall) -> list[Detail]:
     middle = -_DEPTH / 2
     x = width * 0.22
     stack = boxes((x - 0.35, middle - 0.35, ridge - 0.6), (x + 0.35, middle + 0.35, ridge + 1.1), "xXyYZ")
-    details = [Detail([], [(Part(stack.vertices, stack.faces, stack.normals, stack.uv / 2), Palette.chimney)], 3)]
+    details = [Detail([], [(MeshPart(stack.vertices, stack.faces, stack.normals, stack.uv / 2), Palette.chimney)], 3)]
     rise = (ridge - height) / (_DEPTH / 2)
     for x in np.array([0.3, 0.7] if width > 9.5 else [0.5]) * width:
         z0, y0 = height + 0.15 * rise + 0.35, -0.5
@@ -240,6 +243,6 @@ def _roof_details(width, height, ridge, glass, wall) -> list[Detail]:
         cheeks = boxes((x - 0.6, back, height), (x + 0.6, y0, top), "xXY")
         lid = boxes((x - 0.7, back, top), (x + 0.7, y0 + 0.15, top + 0.12), "xXYzZ")
         pane = _panes([(x - 0.45, z0, x + 0.45, top - 0.1)], y0 + 0.03, [glass])
-        cheeks = Part(cheeks.vertices, cheeks.faces, cheeks.normals, cheeks.uv / 2)
+        cheeks = MeshPart(cheeks.vertices, cheeks.faces, cheeks.normals, cheeks.uv / 2)
         details.append(Detail([], [(cheeks, wall), (lid, Palette.stone), *pane], 3.2))
     return details

@@ -8,7 +8,7 @@ import numpy as np
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.patio_furniture import Level, add_furniture
 from mpcam.geometry.patio_plants import add_plants
-from mpcam.geometry.shapes import Builder, Part, boxes, copies, join, lathe, placements, quads, smooth_curve
+from mpcam.geometry.shapes import Builder, MeshPart, boxes, copies, join, lathe, placements, quads, smooth_curve
 from mpcam.geometry.textures import door, painted, planks, plaster, roof_tiles, textured, tiles
 
 _X, _Y = 12.0, 9.0  # half the size of the room
@@ -38,9 +38,9 @@ def _walls(builder: Builder) -> None:
     builder.add(quads(corners, corners[:, :2] / 2.0), floor)
     for bottom, top, scale, material in ((0.0, 1.2, 1.2, foot), (1.2, _SLAB, 3.0, upper), (_UPPER, _TOP, 3.0, upper)):
         inside = boxes((-_X, -_Y, bottom), (_X, _Y, top), "xXyY")
-        builder.add(Part(inside.vertices, inside.faces[:, [0, 2, 1]], -inside.normals, inside.uv / scale), material)
+        builder.add(MeshPart(inside.vertices, inside.faces[:, [0, 2, 1]], -inside.normals, inside.uv / scale), material)
     outside = boxes((-_X - 0.3, -_Y - 0.3, 0), (_X + 0.3, _Y + 0.3, _TOP), "xXyY")
-    builder.add(Part(outside.vertices, outside.faces, outside.normals, outside.uv / 3.0), upper)
+    builder.add(MeshPart(outside.vertices, outside.faces, outside.normals, outside.uv / 3.0), upper)
     # a door leaf and its frame, standing on y = 0 and seen from +y
     leaf = quads([(0.55, 0.03, 0.0), (-0.55, 0.03, 0.0), (-0.55, 0.03, 2.3), (0.55, 0.03, 2.3)])
     frame = [boxes((0.55, 0, 0), (0.7, 0.1, 2.3), "xXY"), boxes((-0.7, 0, 0), (-0.55, 0.1, 2.3), "xXY")]
@@ -68,7 +68,7 @@ def _roof(builder: Builder) -> None:
         builder.add(quads(corners, corners[:, :2] / 2.0), boards)
     rim = z + 0.7
     well = boxes((-_OX, -_OY, z), (_OX, _OY, rim), "xXyY")
-    builder.add(Part(well.vertices, well.faces[:, [0, 2, 1]], -well.normals, well.uv), wood)
+    builder.add(MeshPart(well.vertices, well.faces[:, [0, 2, 1]], -well.normals, well.uv), wood)
     across = np.arange(-6.0, 6.1, 1.2)
     low = np.stack([across - 0.07, np.full(len(across), -_OY), np.full(len(across), z + 0.2)], axis=1)
     high = np.stack([across + 0.07, np.full(len(across), _OY), np.full(len(across), z + 0.42)], axis=1)
@@ -94,7 +94,7 @@ def _ring(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(points), np.concatenate(turns)
 
 
-def _arch(width: float, segments: int) -> Part:
+def _arch(width: float, segments: int) -> MeshPart:
     """The wall above an arch, from z = 2.3 to the gallery, standing along x from 0 to the width."""
     radius, thick = width / 2 - 0.2, 0.15
     angle = np.linspace(np.pi, 0, segments + 1)
@@ -124,7 +124,7 @@ def _gallery(builder: Builder, level: Level) -> None:
     for low, high, edge in slabs:
         builder.add(boxes(low, high, edge), wall)
         plate = boxes(low, high, "zZ")
-        builder.add(Part(plate.vertices, plate.faces, plate.normals, plate.uv / 2.0), boards)
+        builder.add(MeshPart(plate.vertices, plate.faces, plate.normals, plate.uv / 2.0), boards)
     spots, turns = _ring(2.35)
     segments = level(24, 6)
     foot = [(0.28, 0.0), (0.28, 0.12), (0.22, 0.2), (0.2, 0.3)]

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from mpcam.geometry.shapes import Builder, Part, boxes, copies, ellipsoid, join, lathe, loft, placements, smooth_curve
+from mpcam.geometry.shapes import (
+    Builder,
+    MeshPart,
+    boxes,
+    copies,
+    ellipsoid,
+    join,
+    lathe,
+    loft,
+    placements,
+    smooth_curve,
+)
 from mpcam.geometry.textures import painted, planks, textured, tiles
 
 # middle of each table with its chairs
@@ -30,7 +41,7 @@ def add_furniture(builder: Builder, level: Level) -> None:
         builder.add(boxes((x - 1.6, y - 0.9, 0), (x + 1.6, y + 0.9, 0.015), "xXyYZ"), rug)
 
 
-def _curved(profile, level: Level, full: int, segments: int) -> Part:
+def _curved(profile, level: Level, full: int, segments: int) -> MeshPart:
     """A lathe with a rounded profile; None in the profile is a sharp edge. full: points along all of it."""
     cuts = [k for k, point in enumerate(profile) if point is None]
     pieces = [profile[a + 1 : b] for a, b in zip([-1, *cuts], [*cuts, len(profile)], strict=True)]
@@ -122,7 +133,7 @@ def _chairs(builder: Builder, level: Level) -> None:
     builder.add(copies(cushion, matrices), painted("cushion", "#c2483a"))
 
 
-def _pillow(center, size, level: Level, power: float = 5.0) -> Part:
+def _pillow(center, size, level: Level, power: float = 5.0) -> MeshPart:
     """A box with rounded edges and bulging sides: a superellipsoid."""
     rows, columns = level(20, 6), level(40, 12)
     angle, turn = np.linspace(-np.pi / 2, np.pi / 2, rows + 1), np.linspace(0, 2 * np.pi, columns + 1)
@@ -140,7 +151,7 @@ def _pillow(center, size, level: Level, power: float = 5.0) -> Part:
     vertices = (np.asarray(center) + points * np.asarray(size)).reshape(-1, 3)
     vertices = vertices.reshape(rows + 1, columns + 1, 3)
     vertices[:, -1] = vertices[:, 0]
-    return Part(vertices.reshape(-1, 3), ball.faces, normals.reshape(-1, 3), ball.uv)
+    return MeshPart(vertices.reshape(-1, 3), ball.faces, normals.reshape(-1, 3), ball.uv)
 
 
 def _sofas(builder: Builder, level: Level) -> None:

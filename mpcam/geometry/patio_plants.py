@@ -4,7 +4,7 @@ import numpy as np
 
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.patio_furniture import Level
-from mpcam.geometry.shapes import Builder, Part, copies, lathe, loft, placements, smooth_curve, unit
+from mpcam.geometry.shapes import Builder, MeshPart, copies, lathe, loft, placements, smooth_curve, unit
 from mpcam.geometry.textures import painted, plaster, rgb, textured
 
 _TREES = [(8.1, -2.9), (8.1, 2.9), (-8.1, -3.6), (-8.1, 3.6)]
@@ -41,7 +41,7 @@ def add_plants(builder: Builder, level: Level, triangles: int) -> None:
     builder.add(copies(leaf, np.concatenate(matrices), np.concatenate(colors)), blade)
 
 
-def _leaf() -> Part:
+def _leaf() -> MeshPart:
     """A thin closed leaf of 16 triangles, 1 long along y from the origin, its upper side towards z."""
     points, faces = [], []
     for rise in (0.035, -0.02):
@@ -54,7 +54,7 @@ def _leaf() -> Part:
         # the lower side is the upper one turned over
         faces += [[start + k for k in (face if rise > 0 else face[::-1])] for face in side]
     vertices, index = np.array(points), np.array(faces)
-    return Part(vertices, index, Mesh(vertices, index).smooth_normals(), vertices[:, :2] + (0.5, 0.0))
+    return MeshPart(vertices, index, Mesh(vertices, index).smooth_normals(), vertices[:, :2] + (0.5, 0.0))
 
 
 def _frames(place, forward, up, size) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpcam.geometry.mesh import Material, Mesh
-from mpcam.geometry.shapes import Part, join, surface, to_mesh
+from mpcam.geometry.shapes import MeshPart, join, surface, to_mesh
 from mpcam.geometry.textures import rgb
 
 
@@ -43,7 +43,7 @@ def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.concatenate([vertices, middle]), np.stack([np.stack(f, axis=1) for f in four], axis=1).reshape(-1, 3)
 
 
-def _sheet(corner, along, up, pieces: int) -> Part:
+def _sheet(corner, along, up, pieces: int) -> MeshPart:
     """A square sheet of pieces x pieces cells, seen from the side where along x up points."""
     v, u = np.meshgrid(np.linspace(0, 1, pieces + 1), np.linspace(0, 1, pieces + 1), indexing="ij")
     corner, along, up = (np.asarray(a, dtype=np.float64) for a in (corner, along, up))

@@ -12,7 +12,7 @@ from mpcam.geometry.mesh import Material, Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class MeshPart:
     """A piece of surface. vertices (V, 3), faces (F, 3), normals (V, 3) unit, uv (V, 2); colors (V, 3) or None."""
 
     vertices: np.ndarray
@@ -30,9 +30,9 @@ class Builder:
     """Collects parts with their materials and joins them once."""
 
     def __init__(self) -> None:
-        self.parts: list[tuple[Part, Material]] = []
+        self.parts: list[tuple[MeshPart, Material]] = []
 
-    def add(self, part: Part, material: Material) -> None:
+    def add(self, part: MeshPart, material: Material) -> None:
         self.parts.append((part, material))
 
     @property
@@ -43,7 +43,7 @@ class Builder:
         return to_mesh(self.parts, name)
 
 
-def to_mesh(parts: list[tuple[Part, Material]], name: str) -> Mesh:
+def to_mesh(parts: list[tuple[MeshPart, Material]], name: str) -> Mesh:
     """One Mesh of all parts; materials that are the same object become one."""
     materials: dict[int, tuple[int, Material]] = {}
     numbers = [materials.setdefault(id(material), (len(materials), material))[0] for _, material in parts]
@@ -60,13 +60,13 @@ def to_mesh(parts: list[tuple[Part, Material]], name: str) -> Mesh:
     )
 
 
-def join(parts: list[Part]) -> Part:
+def join(parts: list[MeshPart]) -> MeshPart:
     """Several parts as one."""
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
     colors = None
     if any(part.colors is not None for part in parts):
         colors = np.concatenate([np.ones_like(p.vertices) if p.colors is None else p.colors for p in parts])
-    return Part(
+    return MeshPart(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
         np.concatenate([part.normals for part in parts]),
@@ -75,7 +75,7 @@ def join(parts: list[Part]) -> Part:
     )
 
 
-def copies(part: Part, matrices, colors=None) -> Part:
+def copies(part: MeshPart, matrices, colors=None) -> MeshPart:
     """The part once per 4x4 matrix (N, 4, 4); matrices must not mirror. colors: (N, 3) tint of each copy, or None."""
     matrices = np.asarray(matrices, dtype=np.float64).reshape(-1, 4, 4)
     linear = matrices[:, :3, :3]
@@ -89,12 +89,12 @@ def copies(part: Part, matrices, colors=None) -> Part:
         tint = np.repeat(np.asarray(colors, dtype=np.float64), size, axis=0)
     elif tint is not None:
         tint = np.tile(tint, (count, 1))
-    return Part(
+    return MeshPart(
         vertices.reshape(-1, 3), faces.reshape(-1, 3), normals.reshape(-1, 3), np.tile(part.uv, (count, 1)), tint
     )
 
 
-def moved(part: Part, offset=(0.0, 0.0, 0.0), turn: float = 0.0, scale: float = 1.0) -> Part:
+def moved(part: MeshPart, offset=(0.0, 0.0, 0.0), turn: float = 0.0, scale: float = 1.0) -> MeshPart:
     """The part scaled, turned about z by an angle in radians, then moved."""
     return copies(part, placements([offset], [turn], [scale]))
 
@@ -114,13 +114,13 @@ def placements(offsets, turns: ArrayLike = 0.0, scales: ArrayLike = 1.0) -> np.n
     return matrices
 
 
-def quads(corners, uv=None) -> Part:
+def quads(corners, uv=None) -> MeshPart:
     """Flat quadrilaterals. corners: (N, 4, 3), counter-clockwise. uv: (N, 4, 2) or (4, 2), default 0 to 1 on each."""
     corners = np.asarray(corners, dtype=np.float64).reshape(-1, 4, 3)
     uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=np.float64) if uv is None else np.asarray(uv, np.float64)
     normals = unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(corners))[:, None, None]
-    return Part(
+    return MeshPart(
         corners.reshape(-1, 3),
         faces.reshape(-1, 3),
         np.repeat(normals, 4, axis=0),
@@ -139,7 +139,7 @@ _SIDES = {
 }
 
 
-def boxes(low, high, sides: str = "xXyYzZ") -> Part:
+def boxes(low, high, sides: str = "xXyYzZ") -> MeshPart:
     """Boxes with edges along the axes. low, high: (N, 3). sides: which faces to make, small letter = towards minus.
 
     uv is in scene units along the face.
@@ -152,7 +152,7 @@ def boxes(low, high, sides: str = "xXyYzZ") -> Part:
     return quads(chosen, np.take_along_axis(chosen, axes[:, None, :], axis=2))
 
 
-def surface(points, uv=None, normals=None, closed: bool = False) -> Part:
+def surface(points, uv=None, normals=None, closed: bool = False) -> MeshPart:
     """A grid of points (R, C, 3) as a surface; outside is where columns x rows point.
 
     closed: the last column repeats the first. uv: (R, C, 2), default 0 to 1 along columns and rows. normals: (R, C, 3),
@@ -174,7 +174,7 @@ def surface(points, uv=None, normals=None, closed: bool = False) -> Part:
     corners = vertices[faces]
     same = [(corners[:, k] == corners[:, (k + 1) % 3]).all(axis=1) for k in range(3)]
     faces = faces[~(same[0] | same[1] | same[2])]
-    return Part(
+    return MeshPart(
         vertices, faces, np.asarray(normals, np.float64).reshape(-1, 3), np.asarray(uv, np.float64).reshape(-1, 2)
     )
 
@@ -192,7 +192,7 @@ def _grid_normals(points: np.ndarray, closed: bool) -> np.ndarray:
     return unit(normals)
 
 
-def lathe(profile, segments: int, smooth: bool = True, flute: float = 0.0, uv_scale=(1.0, 1.0)) -> Part:
+def lathe(profile, segments: int, smooth: bool = True, flute: float = 0.0, uv_scale=(1.0, 1.0)) -> MeshPart:
     """A surface of revolution about z. profile: (K, 2) radius and height, from the bottom up on the outside.
 
     smooth: rounded along the profile; otherwise every piece of the profile has an edge at both ends.
@@ -229,7 +229,7 @@ def lathe(profile, segments: int, smooth: bool = True, flute: float = 0.0, uv_sc
     return join(parts)
 
 
-def loft(centers, radii, segments: int, across=(1.0, 0.0, 0.0), power: float = 2.0, ripple=None) -> Part:
+def loft(centers, radii, segments: int, across=(1.0, 0.0, 0.0), power: float = 2.0, ripple=None) -> MeshPart:
     """A tube along centers (R, 3) with elliptic cross-sections.
 
     radii: (R,) or (R, 2), the half-widths along `across` and at right angles to it. power: 2 is an ellipse, more is
@@ -257,7 +257,7 @@ def loft(centers, radii, segments: int, across=(1.0, 0.0, 0.0), power: float = 2
     return surface(points, closed=True)
 
 
-def ellipsoid(center, radii, rows: int, segments: int) -> Part:
+def ellipsoid(center, radii, rows: int, segments: int) -> MeshPart:
     """A closed ellipsoid; poles on z."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, rows + 1)
     turn = np.linspace(0, 2 * np.pi, segments + 1)

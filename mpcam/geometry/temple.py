@@ -6,7 +6,7 @@ Stands in for the scene of that name in Gascuel et al. 2008, section 5.1 (4,000 
 import numpy as np
 
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.shapes import Builder, Part, boxes, copies, join, lathe, placements, quads
+from mpcam.geometry.shapes import Builder, MeshPart, boxes, copies, join, lathe, placements, quads
 from mpcam.geometry.textures import painted, plaster, roof_tiles, textured, tiles
 
 _HEIGHT = 6.0  # of the columns
@@ -43,7 +43,7 @@ def _column_spots() -> np.ndarray:
     return spots[np.argsort(np.hypot(spots[:, 0], spots[:, 1]), kind="stable")]
 
 
-def _column(sides: int) -> Part:
+def _column(sides: int) -> MeshPart:
     """A fluted shaft, each facet from foot to top in two triangles; a round capital; a square slab."""
     shaft = lathe([(0.46, 0.0), (0.37, _HEIGHT - 0.4)], sides, flute=0.09, uv_scale=(1.0, 0.3))
     capital = lathe([(0.31, _HEIGHT - 0.45), (0.6, _HEIGHT - 0.2)], sides, uv_scale=(1.0, 0.3))
@@ -123,7 +123,7 @@ def _roof(builder: Builder) -> None:
             width, foot = (oy, rim) if x == s * ox else (ey, eaves)
             points = np.array([(x, -facing * width, foot), (x, facing * width, foot), (x, 0, ridge)])
             normal = np.tile((float(facing), 0.0, 0.0), (3, 1))
-            builder.add(Part(points, np.array([[0, 1, 2]]), normal, points[:, 1:] / 2.0), stone)
+            builder.add(MeshPart(points, np.array([[0, 1, 2]]), normal, points[:, 1:] / 2.0), stone)
 
 
 def _altar(builder: Builder) -> None:

@@ -2,7 +2,7 @@
 
 from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import Part, as_number, coefficients, intrinsics, radtan, undistorted
+from mpcam.io.calibration_parts import Section, as_number, coefficients, intrinsics, radtan, undistorted
 
 STYLE = "COLMAP's cameras.txt"
 MODELS: dict[type[Camera], str] = {
@@ -67,7 +67,7 @@ def _camera(where: str, model: str, size: list[str], values: list[str]) -> Camer
     names = _PARAMETERS[model].split()
     if len(values) != len(names):
         raise InputError(f"{where}: {model} has {len(names)} parameters ({', '.join(names)}), not {len(values)}")
-    part = Part(where, dict(zip(names, values, strict=True)))
+    part = Section(where, dict(zip(names, values, strict=True)))
     given = {key: as_number(value, f"{where}: {key}") for key, value in part.data.items()}
     focal = (given.pop("f"),) * 2 if "f" in given else (given.pop("fx"), given.pop("fy"))
     frame = (*part.size(*size), *focal, given.pop("cx"), given.pop("cy"))

@@ -11,7 +11,7 @@ from mpcam.cameras import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pin
 from mpcam.errors import InputError
 from mpcam.io.calibration_parts import (
     HALF,
-    Part,
+    Section,
     coefficients_held,
     intrinsics,
     inverse,
@@ -39,21 +39,21 @@ def recognizes(text: str) -> bool:
 
 def read(text: str, name: str) -> dict[str, Camera]:
     """Cameras by the names of the file, with the pose of each relative to cam0."""
-    whole = Part(name, read_yaml(text, name))
+    whole = Section(name, read_yaml(text, name))
     found = sorted(int(key[3:]) for key in whole.data if re.fullmatch(r"cam\d+", str(key)))
     if not found or found != list(range(len(found))):
         raise whole.error("cam0, cam1, ... are needed, without gaps")
     cameras: dict[str, Camera] = {}
     pose = np.eye(4)
     for number in found:
-        part = Part(f"{name}: cam{number}", whole.data[f"cam{number}"])
+        part = Section(f"{name}: cam{number}", whole.data[f"cam{number}"])
         if number:
             pose = part.matrix("T_cn_cnm1") @ pose
         cameras[f"cam{number}"] = part.camera(_camera(part).with_pose, pose)
     return cameras
 
 
-def _camera(part: Part) -> Camera:
+def _camera(part: Section) -> Camera:
     model = part.get("camera_model")
     if model not in _LEADING:
         raise part.error(f"camera_model {model!r} is not known here: allowed are {', '.join(_LEADING)}")

@@ -12,7 +12,7 @@ import numpy as np
 from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole
 from mpcam.errors import InputError
 from mpcam.io.calibration_parts import (
-    Part,
+    Section,
     coefficients_held,
     intrinsics,
     inverse,
@@ -41,15 +41,15 @@ def read(text: str, name: str) -> dict[str, Camera]:
         data = json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{name}: not JSON: {error}") from None
-    whole = Part(name, data)
+    whole = Section(name, data)
     frames = whole.get("frames")
     if not isinstance(frames, list) or not frames:
         raise whole.error("frames: a list with at least one frame is needed")
     cameras: dict[str, Camera] = {}
     for number, entry in enumerate(frames):
-        frame = Part(f"{name}: frames[{number}]", entry)
+        frame = Section(f"{name}: frames[{number}]", entry)
         # What a frame does not say itself, the top level says for all.
-        part = Part(frame.where, {key: value for key, value in whole.data.items() if key != "frames"} | frame.data)
+        part = Section(frame.where, {key: value for key, value in whole.data.items() if key != "frames"} | frame.data)
         key = str(part.get("file_path"))
         if key in cameras:
             raise part.error(f"file_path {key!r} is there twice")
@@ -60,7 +60,7 @@ def read(text: str, name: str) -> dict[str, Camera]:
     return cameras
 
 
-def _camera(part: Part) -> Camera:
+def _camera(part: Section) -> Camera:
     model = "OPENCV_FISHEYE" if part.get("is_fisheye", False) is True else part.get("camera_model", "OPENCV")
     if model not in (*_PINHOLES, "OPENCV_FISHEYE"):
         allowed = ", ".join((*_PINHOLES, "OPENCV_FISHEYE"))

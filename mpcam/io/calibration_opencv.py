@@ -10,7 +10,7 @@ from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedO
 from mpcam.errors import InputError
 from mpcam.io.calibration_parts import (
     HALF,
-    Part,
+    Section,
     coefficients_held,
     intrinsics,
     pinhole_or_fisheye,
@@ -39,7 +39,7 @@ def recognizes(text: str) -> bool:
 
 def read(text: str, name: str) -> dict[str, Camera]:
     """The camera, under the name that the file gives it, or "camera"."""
-    part = Part(name, read_yaml(text, name))
+    part = Section(name, read_yaml(text, name))
     size = part.size(part.get("image_width"), part.get("image_height"))
     matrix = _matrix(part, "camera_matrix", 9)
     if any(matrix[i] != expected for i, expected in ((1, 0), (3, 0), (6, 0), (7, 0), (8, 1))):
@@ -54,7 +54,7 @@ def read(text: str, name: str) -> dict[str, Camera]:
     return {str(part.get("camera_name", "camera")): camera}
 
 
-def _is_fisheye(part: Part, coefficients: list[float]) -> bool:
+def _is_fisheye(part: Section, coefficients: list[float]) -> bool:
     if "fisheye_model" in part:
         flag = part.get("fisheye_model")
         return flag if isinstance(flag, bool) else part.number("fisheye_model") != 0
@@ -71,9 +71,9 @@ def _is_fisheye(part: Part, coefficients: list[float]) -> bool:
     return False
 
 
-def _matrix(part: Part, key: str, count: int | None = None) -> list[float]:
+def _matrix(part: Section, key: str, count: int | None = None) -> list[float]:
     """The numbers of a matrix, row by row."""
-    inner = Part(f"{part.where}: {key}", part.get(key))
+    inner = Section(f"{part.where}: {key}", part.get(key))
     numbers = inner.numbers("data", otherwise=[])
     shape = [inner.number(side) for side in ("rows", "cols")]
     if shape[0] * shape[1] != len(numbers) or (count is not None and len(numbers) != count):
@@ -82,7 +82,7 @@ def _matrix(part: Part, key: str, count: int | None = None) -> list[float]:
     return numbers
 
 
-def _xi(part: Part) -> float:
+def _xi(part: Section) -> float:
     if not isinstance(part.get("xi"), dict):
         return part.number("xi")
     (xi,) = _matrix(part, "xi", 1)

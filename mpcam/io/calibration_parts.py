@@ -18,7 +18,7 @@ RADTAN = tuple("k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y".split())
 """OpenCV's coefficients in its order: radial and tangential, rational, thin prism, tilted sensor."""
 
 
-class Part:
+class Section:
     """A mapping in a calibration file, and how to call it in messages: "cam.yaml: cam0"."""
 
     def __init__(self, where: str, data: Any):
@@ -119,14 +119,14 @@ def single(cameras: dict[str, Camera], style: str) -> tuple[str, Camera]:
     return next(iter(cameras.items()))
 
 
-def undistorted(part: Part, coefficients: list[float], what: str) -> None:
+def undistorted(part: Section, coefficients: list[float], what: str) -> None:
     """See that distortion that no model here has is zero."""
     if any(coefficients):
         raise part.error(f"{what} is not zero: no camera of mpcam has it; undistort the images, or fit another model")
 
 
 def pinhole_or_fisheye(
-    part: Part, fisheye: bool, size: tuple[int, int], frame: list[float], coefficients: list[float]
+    part: Section, fisheye: bool, size: tuple[int, int], frame: list[float], coefficients: list[float]
 ) -> Camera:
     """A KannalaBrandt camera, or one with OpenCV's coefficients; frame: fx, fy, cx, cy."""
     if fisheye:
@@ -138,7 +138,7 @@ def pinhole_or_fisheye(
     return radtan(part, size, frame, dict(zip(RADTAN, coefficients, strict=False)))
 
 
-def radtan(part: Part, size: tuple[int, int], frame: list[float], given: dict[str, float]) -> Camera:
+def radtan(part: Section, size: tuple[int, int], frame: list[float], given: dict[str, float]) -> Camera:
     """A camera with radial and tangential distortion, a Pinhole where that is zero; given: coefficients by name."""
     kinds = (("thin prism distortion", ("s1", "s2", "s3", "s4")), ("a tilted sensor", ("tau_x", "tau_y")))
     for kind, names in kinds:

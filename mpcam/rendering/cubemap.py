@@ -201,7 +201,7 @@ def _frozen_look_up(resolution: int, half: bool) -> Any:
 
     from mpcam_kernels import decode, samples
     from mpcam_kernels.frozen import frozen
-    from mpcam_kernels.outputs import Hits as KeptHits
+    from mpcam_kernels.outputs import HitKeys
 
     @frozen
     def look_up(directions: Any, valid: Any, buffers: list[Any], unit: Any) -> tuple[Any, Any, Any]:
@@ -213,6 +213,6 @@ def _frozen_look_up(resolution: int, half: bool) -> Any:
             local = texel - start
             at = samples.slot_of(local % width, local // width, width)
             found = dr.select(inside, dr.gather(t.UInt64, buffer, at, inside), found)
-        return decode.triangles(t, KeptHits, found), decode.depths(t, KeptHits, found, unit), texel
+        return decode.triangles(t, HitKeys, found), decode.depths(t, HitKeys, found, unit), texel
 
     return look_up

@@ -5,7 +5,7 @@ from typing import Any
 
 from mpcam.cameras.chords import chord_pieces
 from mpcam.cameras.outline import HIDDEN, VertexView, without_lines
-from mpcam_kernels.regions import Outline
+from mpcam_kernels.regions import PixelOutline
 
 ROWS = {"tight": 2, "quad": 1, "triangle": 1, "straight": 1}
 """Rows of four numbers per vertex that each bound reads."""
@@ -14,7 +14,7 @@ PIECES = {"triangle": 4}
 """Most outlines of one triangle, where it is not one."""
 
 
-def tight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+def tight(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
     """By the tangents at the corners; the camera's rough box where these are not enough."""
     points = [row[0].xyz for row in rows]
     views = [VertexView(row[1].x, row[1].y, row[1].z, row[0].w) for row in rows]
@@ -22,20 +22,20 @@ def tight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
     return [_or_box(points, quick, sure, camera.local_bound_rough)]
 
 
-def quad(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+def quad(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
     """The box of the quads around the curved edges."""
     return [_kernel_outline(without_lines(camera.local_bound_quads(*(row[0].xyz for row in rows))))]
 
 
-def triangle(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+def triangle(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
     """Up to four bounding triangles; the camera's own box where these are not sure."""
     points = [row[0].xyz for row in rows]
     (first, *others), sure = chord_pieces(camera, *points)
-    rest = [Outline(piece.low, piece.high, piece.valid & sure, piece.lines) for piece in others]
+    rest = [PixelOutline(piece.low, piece.high, piece.valid & sure, piece.lines) for piece in others]
     return [_or_box(points, first, sure, camera.local_bound), *rest]
 
 
-def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
+def straight(camera: Any, rows: list[list[Any]]) -> list[PixelOutline]:
     """Straight-edged image triangles; without an image where a corner is not finite."""
     import drjit as dr
 
@@ -55,7 +55,7 @@ def straight(camera: Any, rows: list[list[Any]]) -> list[Outline]:
         kept = (dr.select(usable, u, 0), dr.select(usable, v, 0), dr.select(usable, -(u * p.x + v * p.y), 1))
         lines.append(type(a)(*kept))
     finite = dr.isfinite(a.x + b.x + c.x + a.y + b.y + c.y + a.z + b.z + c.z)
-    return [Outline(low.xy, high.xy, finite, (lines[0], lines[1], lines[2]))]
+    return [PixelOutline(low.xy, high.xy, finite, (lines[0], lines[1], lines[2]))]
 
 
 def hidden_by_view(first: list[Any]) -> Any:
@@ -74,7 +74,7 @@ HIDDEN_TESTS = {"tight": hidden_by_view}
 OUTLINES = {"tight": tight, "quad": quad, "triangle": triangle, "straight": straight}
 
 
-def _or_box(points: list[Any], outline: Any, sure: Any, bound: Callable[..., Any]) -> Outline:
+def _or_box(points: list[Any], outline: Any, sure: Any, bound: Callable[..., Any]) -> PixelOutline:
     """The outline, or where it is not sure a box, which is worked out only there."""
     import drjit as dr
 
@@ -95,12 +95,12 @@ def _flat(kind: Any, outline: Any) -> tuple[Any, ...]:
     return (*(kind(n) for n in numbers), outline.valid)
 
 
-def _nested(values: Any) -> Outline:
+def _nested(values: Any) -> PixelOutline:
     """The outline at the end of what a branch returned."""
     *numbers, valid = values[-14:]
     first, second, third = (numbers[k : k + 3] for k in (4, 7, 10))
-    return Outline(numbers[0:2], numbers[2:4], valid, (first, second, third))
+    return PixelOutline(numbers[0:2], numbers[2:4], valid, (first, second, third))
 
 
-def _kernel_outline(outline: Any) -> Outline:
-    return Outline(outline.low, outline.high, outline.valid, outline.lines)
+def _kernel_outline(outline: Any) -> PixelOutline:
+    return PixelOutline(outline.low, outline.high, outline.valid, outline.lines)

@@ -38,7 +38,7 @@ class VertexProjected(ZBuffered):
             )
         super().__init__(camera, mesh)
         self.level = level
-        self.parts = Parts(2**self.level)
+        self.parts = Subdivision(2**self.level)
         self.corners = self.faces  # of the whole triangles
         self.faces = self.parts.faces(self.corners, mesh.triangle_count)
 
@@ -132,7 +132,7 @@ def tessellated(grid: Any, at: Any, faces: Any, point: Any, points: int) -> Any:
     return a + (b - a) * second + (c - a) * third
 
 
-class Parts:
+class Subdivision:
     """A triangle cut into divisions**2 equal parts: grid points row by row, from the first corner to the other two.
 
     grid: weights of corners 2 and 3 at the grid points. count: parts per triangle. points: grid points per triangle.
