@@ -189,34 +189,11 @@ class _Bends:
         along = np.where(valid[:, None], along, (0.0, 0.0, 1.0))
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         start = origin + _START * second.radius * along
-        number, distance, w2, w3 = second.trace(start, along)
-        valid = valid & (number >= 0)
-        number, distance = np.where(valid, number, 0), np.where(valid, distance, 0.0)
-        if second.surface is not None:
-            points = second.surface.snap(start + distance[:, None] * along, along)
-            normals = second.surface.normal_at(points)
-        else:
-            points, normals = _on_face(second, number, start, along, w2, w3)
+        found = second.first_hits(start, along)
+        points, normals, valid = found.points, found.normals, valid & found.hit
         ways, passes = bent(along, normals, self.index)
         valid = valid & passes & np.isfinite(ways).all(axis=1) & np.isfinite(points).all(axis=1)
         return np.where(valid[:, None], points, 0.0), np.where(valid[:, None], ways, (0.0, 0.0, 1.0)), valid
-
-
-def _on_face(
-    mesh: Reflector, face: np.ndarray, origin: np.ndarray, along: np.ndarray, second: np.ndarray, third: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where rays cross the planes of faces that they hit, to double precision, and the unit shading normals there."""
-    a, b, c = (mesh.vertices[mesh.faces[face, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    squared = (normal * normal).sum(axis=1)
-    towards = (along * normal).sum(axis=1)
-    sure = np.abs(towards) > 1e-6 * np.sqrt(squared)  # edge-on, float32's weights are as good
-    reach = ((a - origin) * normal).sum(axis=1) / np.where(sure, towards, 1.0)
-    points = origin + reach[:, None] * along
-    w2 = (np.cross(points - a, c - a) * normal).sum(axis=1) / np.maximum(squared, 1e-300)
-    w3 = (np.cross(b - a, points - a) * normal).sum(axis=1) / np.maximum(squared, 1e-300)
-    flat, normals = mesh.at(face, np.where(sure, w2, second), np.where(sure, w3, third))
-    return np.where(sure[:, None], points, flat), normals
 
 
 def _check(cams: Any, index: Any, least: Any, most: Any, tolerance: Any) -> None:

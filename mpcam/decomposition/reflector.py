@@ -1,12 +1,13 @@
 """The true surface behind camera triangles: exact points and normals, traced and searched."""
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from mpcam.backend import exclusive
+from mpcam.cameras.base import Camera
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
@@ -17,6 +18,18 @@ _CLOSE = 1e-9
 """Vertices nearer than this part of the reflector's size are one."""
 _ALIKE = float(np.cos(np.radians(1.0)))
 _CHUNK = 1 << 21
+
+
+class FirstHits(NamedTuple):
+    """Of rays (N,): whether they meet the surface, how far they run (infinite if not), the points (N, 3) and the unit
+    shading normals (N, 3) there, and the rays' own unit directions (N, 3).
+    """
+
+    hit: np.ndarray
+    distance: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    along: np.ndarray
 
 
 class Reflector:
@@ -68,6 +81,48 @@ class Reflector:
             return points, self.surface.normal_at(points)
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         return points, np.where(length > 1e-9, normals / np.maximum(length, 1e-9), self.face_normals[face])
+
+    def first_hits(self, origins: Any, directions: Any) -> "FirstHits":
+        """Where rays (N, 3) of any length meet the true surface first: in closed form where there is one, else along
+        the rays from what `trace` finds.
+        """
+        origins, directions = np.broadcast_arrays(np.asarray(origins, np.float64), np.asarray(directions, np.float64))
+        length = np.linalg.norm(directions, axis=-1, keepdims=True)
+        along = directions / np.where(length > 0, length, 1.0)
+        exact = None if self.surface is None else self.surface.first_crossing(origins, along)
+        if exact is None:
+            face, distance, second, third = self.trace(origins, along)
+            hit = face >= 0
+            face, distance = np.where(hit, face, 0), np.where(hit, distance, 0.0)
+        else:
+            hit = np.isfinite(exact)
+            distance = np.where(hit, exact, 0.0)
+        points = origins + distance[:, None] * along
+        if exact is None and self.surface is None:
+            points, normals = self._on_faces(face, origins, along, second, third)
+        else:
+            assert self.surface is not None
+            if exact is None:
+                points = self.surface.snap(points, along)
+            normals = self.surface.normal_at(points)
+        distance = np.where(hit, ((points - origins) * along).sum(-1), np.inf)
+        return FirstHits(hit & (length[:, 0] > 0), distance, points, normals, along)
+
+    def _on_faces(
+        self, face: np.ndarray, origin: np.ndarray, along: np.ndarray, second: np.ndarray, third: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where rays cross the planes of faces, to double precision, and the unit shading normals there."""
+        a, b, c = (self.vertices[self.faces[face, i]] for i in range(3))
+        normal = np.cross(b - a, c - a)
+        squared = (normal * normal).sum(axis=1)
+        towards = (along * normal).sum(axis=1)
+        sure = np.abs(towards) > 1e-6 * np.sqrt(squared)  # edge-on, float32's weights are as good
+        reach = ((a - origin) * normal).sum(axis=1) / np.where(sure, towards, 1.0)
+        points = origin + reach[:, None] * along
+        w2 = (np.cross(points - a, c - a) * normal).sum(axis=1) / np.maximum(squared, 1e-300)
+        w3 = (np.cross(b - a, points - a) * normal).sum(axis=1) / np.maximum(squared, 1e-300)
+        flat, normals = self.at(face, np.where(sure, w2, second), np.where(sure, w3, third))
+        return np.where(sure[:, None], points, flat), normals
 
     def trace(self, origins: Any, directions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """First hits of rays (N, 3): face (N,), -1 for none, distance in lengths of the direction, weights 2 and 3."""
@@ -160,6 +215,15 @@ def reflector_of(given: Mesh | Surface) -> Reflector:
     if not isinstance(given, (Mesh, Surface)):
         raise InputError(f"the reflector is a {type(given).__name__}: give a Mesh or a Surface, e.g. Surface.sphere()")
     return Reflector(given)
+
+
+def pixel_hits(camera: Camera, reflector: Reflector) -> FirstHits:
+    """Where the rays of a camera's pixels, row by row, meet a reflector."""
+    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    ray = camera.ray(np.stack([u.ravel(), v.ravel()], -1))
+    valid = np.asarray(ray.valid)
+    found = reflector.first_hits(ray.origin, np.where(valid[:, None], ray.direction, (0.0, 0.0, 1.0)))
+    return found._replace(hit=found.hit & valid, distance=np.where(valid, found.distance, np.inf))
 
 
 def _usable_normals(mesh: Mesh) -> np.ndarray:

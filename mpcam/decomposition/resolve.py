@@ -10,13 +10,12 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import shown
 from mpcam.decomposition.ray_error import bent, check_eye, in_world, vertex_normals
-from mpcam.decomposition.reflector import reflector_of
+from mpcam.decomposition.reflector import pixel_hits, reflector_of
 from mpcam.decomposition.shooting import Locator
 from mpcam.decomposition.views import eye_point
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
-from mpcam.rendering.methods import rasterize
 
 FILTERS = ("linear", "nearest")
 
@@ -51,10 +50,9 @@ class Resolver:
         eye, world = eye_point(camera), in_world(cams)
         check_eye(world, eye, whole.radius)
         self.cams, self.camera, self.filter = cams, camera, filter
-        hits = rasterize(camera, whole.mesh)
-        self.mask = hits.mask
-        weights = hits.barycentric[self.mask].astype(np.float64)
-        points, normals = whole.at(hits.triangle[self.mask], weights[:, 0], weights[:, 1])
+        found = pixel_hits(camera, whole)
+        self.mask = found.hit.reshape(camera.height, camera.width)
+        points, normals = found.points[found.hit], found.normals[found.hit]
         self._place = Locator(world.vertices, vertex_normals(world, whole), world.faces).locate(points, normals)
         if world.normals is not None:
             ways, passes = bent(points - eye, normals, world.index)

@@ -57,16 +57,17 @@ def view_of(reflector: Reflector, eye: Any) -> SeenPoints:
     point = eye_point(eye)
     _check_off(reflector, point)
     if isinstance(eye, Camera):
-        face, second, third = _through_pixels(reflector, eye, _MOST)
+        points, normals, face = _through_pixels(reflector, eye, _MOST)
         what = "no pixel of the camera sees the reflector: turn it, or move it"
     else:
         face, second, third = surface_samples(reflector, SAMPLES)
         keep = reflector.sees(point, on_mesh(reflector, face, second, third), SLACK)
-        face, second, third = face[keep], second[keep], third[keep]
+        points, normals = reflector.at(face[keep], second[keep], third[keep])
+        face = face[keep]
         what = f"the eye at {np.round(point, 6).tolist()} sees nothing of the reflector: give another point"
     if len(face) == 0:
         raise InputError(what)
-    return SeenPoints(point, *reflector.at(face, second, third), face, isinstance(eye, Camera))
+    return SeenPoints(point, points, normals, face, isinstance(eye, Camera))
 
 
 def seen_samples(reflector: Reflector, eye: Any, count: int) -> SeenPoints:
@@ -74,10 +75,9 @@ def seen_samples(reflector: Reflector, eye: Any, count: int) -> SeenPoints:
     point = eye_point(eye)
     _check_off(reflector, point)
     if isinstance(eye, Camera):
-        face, second, third = _through_pixels(reflector, eye, _MOST)
+        points, normals, face = _through_pixels(reflector, eye, _MOST)
         pick = np.unique(np.linspace(0, max(len(face) - 1, 0), min(count, len(face))).astype(int))
-        face, second, third = face[pick], second[pick], third[pick]
-        points, normals = reflector.at(face, second, third)
+        points, normals, face = points[pick], normals[pick], face[pick]
     else:
         wanted = count
         for _ in range(4):
@@ -110,14 +110,18 @@ def surface_samples(reflector: Reflector, count: int) -> tuple[np.ndarray, np.nd
 
 
 def _through_pixels(reflector: Reflector, camera: Camera, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hits of a camera's pixel centers; of every n-th pixel where there are more than `most`."""
+    """Points (N, 3), normals (N, 3) and faces (N,) that pixels see; of every n-th where there are more than `most`."""
     number = np.arange(0, camera.width * camera.height, -(-camera.width * camera.height // most))
     v, u = np.divmod(number, camera.width)
     ray = camera.ray(np.stack([u + 0.5, v + 0.5], axis=-1))
     valid = np.asarray(ray.valid)
-    face, _, second, third = reflector.trace(np.asarray(ray.origin)[valid], np.asarray(ray.direction)[valid])
-    hit = face >= 0
-    return face[hit], second[hit], third[hit]
+    origin, along = np.asarray(ray.origin)[valid], np.asarray(ray.direction)[valid]
+    found = reflector.first_hits(origin, along)
+    points, normals = found.points[found.hit], found.normals[found.hit]
+    face = reflector.trace(origin[found.hit], along[found.hit])[0]
+    beside = face < 0  # the outline of the mesh lies within that of the surface
+    face[beside] = reflector.closest(points[beside], normals[beside])[0]
+    return points, normals, face
 
 
 def on_mesh(reflector: Reflector, face: np.ndarray, second: np.ndarray, third: np.ndarray) -> np.ndarray:

@@ -12,12 +12,11 @@ from mpcam.cameras.pinhole import Pinhole
 from mpcam.cameras.radial import Radial
 from mpcam.decomposition.chained import Chained
 from mpcam.decomposition.ray_error import bent, vertex_normals
-from mpcam.decomposition.reflector import Reflector
+from mpcam.decomposition.reflector import Reflector, pixel_hits
 from mpcam.decomposition.resolve import texel_weights
 from mpcam.decomposition.shooting import Locator
 from mpcam.math.pose import look_at
 from mpcam.rendering.device import DeviceMesh
-from mpcam.rendering.methods import rasterize
 
 MARGIN = 1.0
 """Pixels that the light's view leaves free around the reflector."""
@@ -92,10 +91,9 @@ def photons(
     fresnel: whether refraction loses what an interface reflects.
     """
     view = light_camera(light, reflector, size)
-    hits = rasterize(view, reflector.mesh)
-    mask = hits.mask
-    weights = hits.barycentric[mask].astype(np.float64)
-    points, normals = reflector.at(hits.triangle[mask], weights[:, 0], weights[:, 1])
+    found = pixel_hits(view, reflector)
+    mask = found.hit.reshape(view.height, view.width)
+    points, normals = found.points[found.hit], found.normals[found.hit]
     incident = points - light
     reach = np.linalg.norm(incident, axis=1)
     true, passes = bent(incident, normals, cams.index)
@@ -103,7 +101,7 @@ def photons(
     index = None if cams.index is None else float(cams.index)
     if index is None:
         # Light that meets the mirror again is not followed further.
-        again = reflector.trace(points + _OFF * reflector.radius * true, true)[0] >= 0
+        again = reflector.first_hits(points + _OFF * reflector.radius * true, true).hit
         share[again] = 0.0
     elif fresnel:
         share *= transmitted(np.abs((incident * normals).sum(1)) / reach, index)
@@ -224,9 +222,6 @@ def transmitted(cosine: np.ndarray, index: float) -> np.ndarray:
 
 def _leaving(back: Reflector, points: np.ndarray, ways: np.ndarray, index: float) -> np.ndarray:
     """Part (N,) of the light of rays that goes out through the back of a lens."""
-    face, _, second, third = back.trace(points + _OFF * back.radius * ways, ways)
-    met = face >= 0
-    through = np.zeros(len(points))
-    normals = back.at(face[met], second[met], third[met])[1]
-    through[met] = transmitted(np.abs((ways[met] * normals).sum(1)), index)
-    return through
+    found = back.first_hits(points + _OFF * back.radius * ways, ways)
+    cosine = np.abs((ways * found.normals).sum(1))
+    return np.where(found.hit, transmitted(np.where(found.hit, cosine, 0.0), index), 0.0)

@@ -7,11 +7,13 @@ import numpy as np
 
 from mpcam.checks import shown, whole_number
 from mpcam.errors import InputError
+from mpcam.geometry import crossings
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.shapes import surface, unit
 
 MOST = 20_000_000
 """Triangles that `Surface.mesh` makes at most."""
+_EDGE = 1.0 + 1e-12  # a patch has its border
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -42,6 +44,16 @@ class Surface:
         """A function (...) that is zero on the surface and grows outwards, and its gradient (..., 3)."""
         raise TypeError(f"{type(self).__name__} must define _level")
 
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray | None:
+        """Distances (N, K) at which lines from (N, 3) along unit directions may cross the whole surface that this is
+        a part of, infinite for none, in any order; None where they are not known in closed form.
+        """
+        return None
+
+    def _within(self, x: np.ndarray) -> np.ndarray:
+        """Whether points (..., 3) of the whole surface are on this part of it."""
+        return np.ones(x.shape[:-1], bool)
+
     # What they share.
 
     def point(self, u: Any, v: Any) -> np.ndarray:
@@ -71,6 +83,29 @@ class Surface:
             steep = np.abs(slope) > 1e-3 * np.linalg.norm(gradient, axis=-1) * np.linalg.norm(step, axis=-1)
             x = x - np.where(steep, level / np.where(steep, slope, 1.0), 0.0)[..., None] * step
         return self._to_world(x)
+
+    def first_crossing(self, origins: Any, directions: Any) -> np.ndarray | None:
+        """How far rays (N, 3) along unit directions (N, 3) run to the surface, infinite beside it; None for kinds of
+        which no closed form is known.
+        """
+        origin = self._to_own(np.asarray(origins, np.float64))
+        along = np.asarray(directions, np.float64) @ self.world_from_surface[:3, :3]
+        # From the point nearest to the middle, so that nothing cancels however far away the rays start.
+        skip = -(origin * along).sum(-1)
+        middle = origin + skip[:, None] * along
+        found = self._crossings(middle, along)
+        if found is None:
+            return None
+        exists = np.isfinite(found)
+        found = np.where(exists, found, 0.0)
+        for _ in range(3):
+            level, gradient = self._level(middle[:, None] + found[..., None] * along[:, None])
+            slope = (gradient * along[:, None]).sum(-1)
+            steep = np.abs(slope) > 1e-3 * np.linalg.norm(gradient, axis=-1)
+            found = found - np.where(steep, level / np.where(steep, slope, 1.0), 0.0)
+        x = middle[:, None] + found[..., None] * along[:, None]
+        exists &= (found + skip[:, None] > 0) & self._within(x)
+        return np.where(exists, found + skip[:, None], np.inf).min(axis=1)
 
     def mesh(self, triangles: int = 20_000) -> Mesh:
         """A mesh of about so many triangles with exact vertices and normals, cells as square as whole numbers allow.
@@ -176,6 +211,10 @@ class Ellipsoid(Surface):
         length = np.maximum(np.linalg.norm(scaled, axis=-1), 1e-300)
         return length - 1.0, scaled / self.radii / length[..., None]
 
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+        o, d = origin / self.radii, along / self.radii
+        return crossings.quadratic((d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1.0)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Torus(Surface):
@@ -195,6 +234,15 @@ class Torus(Surface):
         side = out / far / thick
         return thick - self.tube, np.stack([side * x[..., 0], side * x[..., 1], x[..., 2] / thick], axis=-1)
 
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+        found = np.full((len(origin), 4), np.inf)
+        near = (origin * origin).sum(-1) <= (1.001 * (self.ring + self.tube)) ** 2
+        found[near] = crossings.torus(self.ring, self.tube, origin[near], along[near])
+        return found
+
+    def _within(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.abs(self._level(x)[0]) <= 1e-9 * (self.ring + self.tube))
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cylinder(Surface):
@@ -213,6 +261,14 @@ class Cylinder(Surface):
     def _level(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         far = np.maximum(np.hypot(x[..., 0], x[..., 1]), 1e-300)
         return far - self.radius, np.stack([x[..., 0] / far, x[..., 1] / far, 0.0 * far], axis=-1)
+
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+        o, d = origin[:, :2], along[:, :2]
+        return crossings.quadratic((d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - self.radius**2)
+
+    def _within(self, x: np.ndarray) -> np.ndarray:
+        around = np.abs(np.arctan2(x[..., 1], x[..., 0]))
+        return np.asarray((np.abs(x[..., 2]) <= _EDGE * 0.5 * self.length) & (around <= _EDGE * 0.5 * self.angle))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -244,6 +300,12 @@ class Paraboloid(HeightField):
         bend = self.height / self.radius**2
         return bend * (x * x + y * y), 2 * bend * x, 2 * bend * y
 
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+        return _bowl(self.height / self.radius**2 * np.array([1.0, 1.0]), origin, along)
+
+    def _within(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.hypot(x[..., 0], x[..., 1]) <= _EDGE * self.radius)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Saddle(HeightField):
@@ -256,6 +318,12 @@ class Saddle(HeightField):
     def _height(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         bend = 4 * self.height / self.size**2
         return bend * (x * x - y * y), 2 * bend * x, -2 * bend * y
+
+    def _crossings(self, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+        return _bowl(4 * self.height / self.size**2 * np.array([1.0, -1.0]), origin, along)
+
+    def _within(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray((np.abs(x[..., :2]) <= _EDGE * 0.5 * self.size).all(-1))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -271,6 +339,13 @@ class Wave(HeightField):
         k = 2 * np.pi * self.waves / self.size
         sx, sy, cx, cy = np.sin(k * x), np.sin(k * y), np.cos(k * x), np.cos(k * y)
         return self.height * sx * sy, self.height * k * cx * sy, self.height * k * sx * cy
+
+
+def _bowl(bends: np.ndarray, origin: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Distances (N, 2) to z = bends[0] x^2 + bends[1] y^2."""
+    o, d = origin[:, :2], along[:, :2]
+    linear = 0.5 * along[:, 2] - (bends * o * d).sum(-1)
+    return crossings.quadratic(-(bends * d * d).sum(-1), linear, origin[:, 2] - (bends * o * o).sum(-1))
 
 
 def _parameters(u: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
