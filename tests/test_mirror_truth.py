@@ -225,7 +225,10 @@ def pixel_centers(camera):
     return np.stack([u + 0.5, v + 0.5], -1)
 
 
-MIRRORS = {"sphere": (Surface.sphere(1.0), (0, -3.2, 1.0)), "wave": (Surface.wave(height=0.05), (0.2, -1.5, 3.0))}
+MIRRORS = {
+    "sphere": (Surface.sphere(1.0), (0, -3.2, 1.0)),
+    "wave": (Surface.wave(height=0.05, waves=1.0), (0.2, -1.5, 3.0)),
+}
 
 
 def check_falls(name, counts):

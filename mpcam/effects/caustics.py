@@ -27,6 +27,7 @@ from mpcam.effects.caustic_settings import Settings
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.moved import moved
 from mpcam.geometry.surfaces import Surface
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
@@ -62,7 +63,7 @@ class Caustics:
             index=settings.index,
         )
         self._atlas: Any = None
-        self._vertices = scene.mesh.vertices
+        self._mesh = scene.mesh
         self._objects = _objects(scene)
         self._shine()
         self.aim(camera)
@@ -79,11 +80,11 @@ class Caustics:
         self.photons: Photons = photons(place, self._reflector, self.cams, settings.photons, behind, settings.fresnel)
         if self._atlas is None or behind is not None:
             self._atlas = prepare(last, self.scene.mesh)
-            self._atlas.update(self._vertices)
+            self._atlas.move(self._mesh)
         else:
             self._atlas.aim(last)
         self._shade: Any = prepare(self.photons.camera, self.scene.mesh, output="depth")
-        self._shade.update(self._vertices)
+        self._shade.move(self._mesh)
         self._rays = self.photons.on_device(self._atlas.device, self.scene.mesh.triangle_count)
         self._forget()
 
@@ -94,13 +95,7 @@ class Caustics:
         lights = scene.lights if self.light in scene.lights else (*scene.lights, self.light)
         meshes = scene.meshes
         if self.settings.show:
-            mesh = self._given if isinstance(self._given, Mesh) else self._reflector.mesh
-            # Joining would give meshes without normals other vertices, where some have them: `update` counts on these.
-            normals = mesh.normals if mesh.normals is not None else mesh.smooth_normals()
-            meshes = (
-                scene.mesh,
-                dataclasses.replace(mesh, normals=normals if scene.mesh.normals is not None else None),
-            )
+            meshes = (scene.mesh, self._given if isinstance(self._given, Mesh) else self._reflector.mesh)
         return dataclasses.replace(scene, meshes=meshes, lights=lights)
 
     @exclusive
@@ -116,16 +111,26 @@ class Caustics:
         self._place_eye()
 
     def _place_eye(self) -> None:
-        rest = self.seen_scene.mesh.vertices[len(self.scene.mesh.vertices) :]
-        self._eye.update(np.concatenate([self._vertices, rest]))
+        whole, count = self.seen_scene.mesh, len(self._mesh.vertices)
+        if self._mesh is self.scene.mesh:
+            self._eye.move(whole)
+        else:
+            places, normals = whole.vertices.copy(), None if whole.normals is None else whole.normals.copy()
+            places[:count] = self._mesh.vertices
+            if normals is not None and self._mesh.normals is not None:
+                normals[:count] = self._mesh.normals
+            self._eye.move(moved(whole, places, normals))
         self._forget("hits", "_surface")
 
     @exclusive
-    def update(self, vertices: Any) -> None:
-        """New positions (V, 3) of the vertices of `scene.mesh`, for receivers that move."""
-        self._atlas.update(vertices)
-        self._shade.update(vertices)
-        self._vertices = np.asarray(vertices, np.float64)
+    def update(self, vertices: Any = None, *, normals: Any = None, transform: Any = None) -> None:
+        """Receivers elsewhere: positions (V, 3) of the vertices of `scene.mesh`, or a list with one array for each of
+        the scene's meshes, or a rigid transform; see `Moving.update`. Raises InputError as that does.
+        """
+        self._mesh = moved(self.scene.mesh, vertices, normals, transform)
+        self._atlas.move(self._mesh)
+        self._shade.move(self._mesh)
+        self._rays = self.photons.on_device(self._atlas.device, self.scene.mesh.triangle_count)
         self._place_eye()
         self._forget()
 
@@ -272,9 +277,8 @@ class Caustics:
         """Shadow maps of the lights, of receivers and reflector where they are; kept until something moves."""
         found = self.__dict__.get("_maps")
         if found is None or found[0] != size:
-            mesh, count = self._reflector.mesh, len(self._vertices)
-            vertices = np.concatenate([self._vertices, mesh.vertices])
-            solid = Mesh(vertices, np.concatenate([self.scene.mesh.faces, mesh.faces + count]))
+            parts = (self._mesh, self._reflector.mesh)
+            solid = Mesh.concatenate([Mesh(part.vertices, part.faces) for part in parts])
             maps = tuple(shadow_map(solid, light, size) for light in self.seen_scene.lights)
             found = self.__dict__["_maps"] = size, maps
         return found[1]

@@ -44,8 +44,8 @@ class MirrorPart(Protocol):
         """Which of STAGES it takes, and on what."""
         ...
 
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the scene's vertices."""
+    def move(self, mesh: Mesh) -> None:
+        """The scene's mesh as it is now (see `Moving.move`)."""
         ...
 
     def colors(self) -> list[Any]:
@@ -66,8 +66,8 @@ class Direct:
     def __init__(self, prepared: Any, shaded: Shaded):
         self.prepared, self.shaded = prepared, shaded
 
-    def update(self, vertices: np.ndarray) -> None:
-        self.prepared.update(vertices)
+    def move(self, mesh: Mesh) -> None:
+        self.prepared.move(mesh)
 
     def colors(self) -> list[Any]:
         return list(self.shaded(self.prepared.frame()))
@@ -122,13 +122,13 @@ class ByEnvironment:
     def __init__(self, mesh: Mesh, surface: Mesh | Surface, ray: Ray, size: int, shaded: Shaded):
         self.size, self.shaded = size, shaded
         middle = reflector_of(surface).center
-        self.views = [prepare(camera, mesh) for camera in back_to_back(middle, size)]
+        self.views: list[Any] = [prepare(camera, mesh) for camera in back_to_back(middle, size)]
         directions = np.ascontiguousarray(np.asarray(ray.direction).T, np.float32)
         self.directions = types().Array3f(directions) + opaque_zero()
 
-    def update(self, vertices: np.ndarray) -> None:
+    def move(self, mesh: Mesh) -> None:
         for view in self.views:
-            view.update(vertices)
+            view.move(mesh)
 
     def colors(self) -> list[Any]:
         import drjit as dr

@@ -20,10 +20,11 @@ from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, By
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.moved import moved
 from mpcam.rendering.explanation import Explanation, Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
-from mpcam.rendering.shade import check_shading, check_shadows, shade_device
+from mpcam.rendering.shade import check_shading, check_shadows, shade_device, vertex_normals
 from mpcam.scene.mirror import Mirror
 from mpcam.scene.scene import Scene
 
@@ -77,7 +78,7 @@ class Reflection:
             if value is not None and name not in names[method]:
                 fitting = " or ".join(repr(one) for one in names if name in names[one])
                 raise InputError(f"{name}= goes with method={fitting}, not with {method!r}")
-        self.direct = prepare(given, scene.mesh)
+        self.direct: Any = prepare(given, scene.mesh)
         self.part = self._part(triangles, resolution, size, level, cams)
         self._color = opaque_numbers(list(found.color))
 
@@ -108,10 +109,18 @@ class Reflection:
         return ByTracing(camera, mesh, self.rays.ray, self.shaded)
 
     @exclusive
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the scene's vertices, meshes in order; nothing but their upload is needed."""
-        self.direct.update(vertices)
-        self.part.update(vertices)
+    def update(self, vertices: Any = None, *, normals: Any = None, transform: Any = None) -> None:
+        """The scene elsewhere: positions (V, 3) of all its vertices or a list with one array for each of its meshes,
+        or a rigid transform; see `Moving.update`. The mirror and its camera triangles stay. Raises InputError for other
+        shapes, where shading needs normals that are not known, and where there are shadows, which would stay behind.
+        """
+        if self.shadows:
+            raise InputError("shadow maps do not move with the scene: make a Reflection anew, with new maps")
+        mesh = moved(self.scene.mesh, vertices, normals, transform)
+        if self.shading in ("light", "normal"):
+            vertex_normals(mesh)
+        self.direct.move(mesh)
+        self.part.move(mesh)
 
     @exclusive
     def frame(self) -> Any:

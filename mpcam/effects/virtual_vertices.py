@@ -22,6 +22,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
 from mpcam.math.pose import frame_origin
 from mpcam.rendering.camera_triangle_rays import corner_rays
+from mpcam.rendering.device_camera import world_rays
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 
 
@@ -36,13 +37,17 @@ class VirtualVertices(VertexProjected):
 
     def __init__(self, camera: Camera, mesh: Mesh, cams: CameraTriangles, rays: Ray, level: int = 0):
         super().__init__(camera, mesh, level)
-        self._set_up(with_directions(cams), rays)
+        self.cams, view = with_directions(cams), world_rays(rays)
+        self.view = lambda: view
+        self._set_up()
+
+    def _reframed(self) -> None:
+        super()._reframed()
+        self._set_up()
 
     @exclusive
-    def _set_up(self, cams: CameraTriangles, rays: Ray) -> None:
-        t, mesh = types(), self.mesh
-        view = self.device.view(*self.device.rays(rays))
-        self.view = lambda: view
+    def _set_up(self) -> None:
+        t, mesh, cams = types(), self.mesh, self.cams
         pose = np.asarray(cams.camera_from_world, np.float64)
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = pose[:3, :3].T, frame_origin(pose) - self.device.anchor

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,13 +39,14 @@ class Material:
             object.__setattr__(self, "texture", _frozen(texture, np.float32))
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Mesh:
     """An indexed triangle mesh. All arrays are copied and read-only.
 
     vertices: (V, 3) float64. NaN and infinite vertices are allowed; their triangles are never hit.
     faces: (F, 3) int32 vertex numbers, counter-clockwise seen from outside.
-    normals: (V, 3) float64 unit shading normals, or None: each face is shaded with its own normal.
+    normals: (V, 3) float64 unit shading normals, or None: each face is shaded with its own normal, as it is at vertices
+    whose normal is (0, 0, 0).
     uv: (V, 2) float64 texture coordinates, v up (OpenGL), or None.
     colors: (V, 3) float64 linear RGB that multiplies the material, or None.
     materials: one or more; face_material: (F,) int32 material number of each face, or None: all use the first.
@@ -61,6 +63,8 @@ class Mesh:
     materials: tuple[Material, ...]
     face_material: np.ndarray | None
     name: str
+    parts: ClassVar[tuple[int, ...]] = ()
+    """How many vertices each of the meshes has that this one was joined from."""
 
     def __init__(
         self,
@@ -144,6 +148,14 @@ class Mesh:
                 e1, e2 = e1 / scale, e2 / scale
         return np.cross(e1, e2)
 
+    @cached_property
+    def follows_faces(self) -> bool:
+        """Whether all shading normals are those of the faces around, to float32, so that they can be made anew."""
+        if self.normals is None:
+            return True
+        given = self.normals.any(axis=1)
+        return bool(np.allclose(self.normals[given], self.smooth_normals()[given], rtol=0.0, atol=1e-6))
+
     def smooth_normals(self) -> np.ndarray:
         """(V, 3) unit vertex normals, the area-weighted mean over the faces of each vertex.
 
@@ -175,16 +187,19 @@ class Mesh:
         if normals is not None:
             # the cofactor matrix is the inverse transpose up to scale, and exists for flattening matrices too
             cofactor = np.cross(even[[1, 2, 0]], even[[2, 0, 1]])
-            normals = _unit(normals @ (-cofactor if mirrored else cofactor).T)
+            given = normals.any(axis=1, keepdims=True)
+            normals = np.where(given, _unit(normals @ (-cofactor if mirrored else cofactor).T), 0.0)
         faces = self.faces[:, [0, 2, 1]] if mirrored else self.faces
-        return replace(self, vertices=vertices, faces=faces, normals=normals)
+        result = replace(self, vertices=vertices, faces=faces, normals=normals)
+        object.__setattr__(result, "parts", self.parts)
+        return result
 
     @staticmethod
     def concatenate(meshes, name: str = "") -> "Mesh":
         """One mesh with the faces of all, in order.
 
-        Attributes that only some have are filled in: uv with 0, colors with 1; normals with those of the faces, for
-        which such a mesh gets three vertices of its own per face. Raises InputError if something is not a Mesh.
+        Attributes that only some have are filled in: uv with 0, colors with 1, normals with (0, 0, 0), which stands for
+        those of the faces. Raises InputError if something is not a Mesh.
         """
         meshes = tuple(meshes)
         for mesh in meshes:
@@ -194,9 +209,10 @@ class Mesh:
             return Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32), name=name)
         if len(meshes) == 1:
             return replace(meshes[0], name=name or meshes[0].name)
+        normals = uv = colors = None
         if any(mesh.normals is not None for mesh in meshes):
-            meshes = tuple(mesh if mesh.normals is not None else mesh.flat() for mesh in meshes)
-        uv = colors = None
+            tables = [np.zeros_like(m.vertices) if m.normals is None else m.normals for m in meshes]
+            normals = np.concatenate(tables)
         if any(mesh.uv is not None for mesh in meshes):
             uv = np.concatenate([np.zeros((len(m.vertices), 2)) if m.uv is None else m.uv for m in meshes])
         if any(mesh.colors is not None for mesh in meshes):
@@ -208,16 +224,21 @@ class Mesh:
             known = np.array([materials.setdefault(id(m), (len(materials), m))[0] for m in mesh.materials], np.int32)
             own = np.zeros(len(mesh.faces), np.int32) if mesh.face_material is None else mesh.face_material
             numbers.append(known[own])
-        return Mesh(
+        result = Mesh(
             np.concatenate([mesh.vertices for mesh in meshes]),
             np.concatenate([mesh.faces.astype(np.int64) + start for mesh, start in zip(meshes, offsets, strict=False)]),
-            normals=None if meshes[0].normals is None else np.concatenate([mesh.normals for mesh in meshes]),
+            normals=normals,
             uv=uv,
             colors=colors,
             materials=tuple(material for _, material in materials.values()),
             face_material=np.concatenate(numbers) if len(materials) > 1 else None,
             name=name,
         )
+        object.__setattr__(result, "parts", tuple(len(mesh.vertices) for mesh in meshes))
+        return result
+
+    def __repr__(self) -> str:
+        return f"Mesh({self.name!r}, {len(self.vertices):,} vertices, {len(self.faces):,} triangles)"
 
     def flat(self) -> "Mesh":
         """The mesh with three vertices of its own per face, and the faces' normals as shading normals."""

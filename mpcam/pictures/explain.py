@@ -44,7 +44,7 @@ def _shading(scene: Scene, shading: str, shadows: bool) -> Iterator[Step]:
     has = "the mesh has none" if not table.textured else ""
     yield Step("textures", wants and table.textured, has if wants else unlit)
     normals = shading in ("normal", "light")
-    kind = "per vertex" if table.smooth else "per face"
+    kind = "per face" if mesh.normals is None else "per vertex"
     yield Step("normals", normals, kind if normals else unlit)
     count = len(scene.lights)
     yield Step(

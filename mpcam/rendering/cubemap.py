@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, types
+from mpcam.backend import exclusive, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.pinhole import Pinhole
 from mpcam.checks import whole_number
@@ -17,6 +17,7 @@ from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.invert import Inverted
+from mpcam.rendering.moving import Moving
 
 # Right, down and forward axes of each face in the camera frame: front, +x, -x, +y, -y, back.
 _AXES = np.array(
@@ -49,7 +50,7 @@ def face_cameras(camera: Camera, resolution: int, half: bool) -> list[Pinhole]:
     return cameras
 
 
-class Cubemapped:
+class Cubemapped(Moving):
     """Frames resampled from the faces of a cube around the camera: nearest texel, so hits stay real hits."""
 
     method = "cubemap"
@@ -59,16 +60,16 @@ class Cubemapped:
     def __init__(self, camera: Camera, mesh: Mesh, resolution: int = 256):
         resolution = whole_number("resolution", resolution, 1, 16384, unit="pixels")
         self._check(camera)
-        self.mesh, self.resolution = mesh, resolution
-        self.faces = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
-        self.unit = opaque_numbers([self.faces[0].device.scale])[0]
+        self.resolution = resolution
+        self._prepare_mesh(mesh)
+        self.views = [Inverted(face, mesh) for face in face_cameras(camera, self.resolution, self.half)]
         self.camera, self.device_camera = camera, device_camera(camera)
 
     @exclusive
     def aim(self, camera: Camera) -> None:
         """Another camera, or another pose of it: the scene stays as it is. Raises InputError as at the beginning."""
         self._check(camera)
-        for face, view in zip(self.faces, face_cameras(camera, self.resolution, self.half), strict=True):
+        for face, view in zip(self.views, face_cameras(camera, self.resolution, self.half), strict=True):
             face.aim(view)
         self.camera, self.device_camera = camera, device_camera(camera)
 
@@ -81,23 +82,26 @@ class Cubemapped:
                 f"method='hemicube' sees 180 degrees, the camera {np.degrees(2 * angle):.0f}: use method='cubemap'"
             )
 
+    def _reframed(self) -> None:
+        pass  # faces do it for themselves
+
     @exclusive
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the vertices."""
-        self.faces[0].update(vertices)
-        for face in self.faces[1:]:
-            face.vertices = self.faces[0].vertices
+    def move(self, mesh: Mesh) -> None:
+        """See `Moving.move`."""
+        super().move(mesh)
+        for face in self.views:
+            face.move(mesh)
 
     @exclusive
     def frame(self) -> Hits:
         """One frame, evaluated."""
-        return self._hits([face.buffer() for face in self.faces])
+        return self._hits([face.buffer() for face in self.views])
 
     @exclusive
     def stages(self) -> dict[str, float]:
         """Seconds of one frame by stage."""
         clock = Clock()
-        frames = [face.buffer() for face in self.faces]
+        frames = [face.buffer() for face in self.views]
         clock.done("faces", frames)
         self._hits(frames)
         clock.done("resample")
@@ -121,7 +125,7 @@ class Cubemapped:
             if self.mesh.triangle_count == 0:
                 return depth * 0.0, depth * 0.0
             directions = _texel_directions(texel, self.resolution, self.half)
-            front = self.faces[0]  # its frame is the camera's own
+            front = self.views[0]  # its frame is the camera's own
             found = decode.weights(
                 types(), ray_triangle, frames[0][0][0], front.faces, triangle, directions, types().Array4f
             )
@@ -131,10 +135,10 @@ class Cubemapped:
         def stats() -> Stats:
             if self.mesh.triangle_count == 0:
                 return Stats(0, 0)
-            counts = np.sum([face.count(placed) for face, (placed, _) in zip(self.faces, frames, strict=True)], 0)
+            counts = np.sum([face.count(placed) for face, (placed, _) in zip(self.views, frames, strict=True)], 0)
             return Stats(int(counts[0]), int(counts[1]))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.faces[0].vertices)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats)
 
 
 class Hemicubed(Cubemapped):

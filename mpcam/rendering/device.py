@@ -6,63 +6,48 @@ from typing import Any
 import numpy as np
 
 from mpcam.backend import opaque_numbers, opaque_zero, types
-from mpcam.cameras.types import PosedRays, Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.moved import MovedMesh
+from mpcam.geometry.order import nearby
+
+_SAMPLE = 4096  # vertices that tell where most of a mesh is
+_FAR = 64.0  # a mesh that reaches so many times farther than most of its vertices has something far away
 
 
 class DeviceMesh:
     """Vertices and faces in device memory.
 
     Vertices are kept as (v - anchor) / scale, which fills about [-1, 1], so that float32 holds a small mesh far from
-    the world's origin, or a mesh of 1e-8 or 1e8 units, as well as any other.
+    the world's origin, or a mesh of 1e-8 or 1e8 units, as well as any other. Anchor and scale are round numbers, so
+    that they stay where they are while the mesh moves a little.
     """
 
     def __init__(self, mesh: Mesh):
         t = types()
-        used = mesh.corners.reshape(-1, 3)  # vertices that no face uses must not widen the range
-        used = used[np.isfinite(used).all(axis=1)]
-        low, high = (used.min(0), used.max(0)) if len(used) else (np.zeros(3), np.zeros(3))
+        base = mesh.base if isinstance(mesh, MovedMesh) else None
+        self.base = None if base is None else device_mesh(base)  # that of the mesh before it moved, or None
+        self._used = _used(mesh) if self.base is None else self.base._used
         self.shape = mesh.vertices.shape
-        extent = float(np.max(high - low)) / 2
-        self.anchor = 0.5 * low + 0.5 * high
-        self.scale = extent if extent > 0 else 1.0
-        self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
-        self.vertices = self.place(mesh.vertices)
-        self.ordered: Any = None  # by who wants neighbors together
+        self.anchor, self.scale = _frame(mesh.vertices if self._used is None else mesh.vertices[self._used])
+        if self.base is None:
+            self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
+        else:
+            self.faces = self.base.faces
+        self.vertices = in_frame(mesh.vertices, self.anchor, self.scale)
+        self._ordered: Any = None
 
-    def place(self, vertices: np.ndarray) -> Any:
-        """Other positions of the same vertices, uploaded; raises InputError unless there are as many of them."""
-        try:
-            vertices = np.asarray(vertices, np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"vertices are a {type(vertices).__name__}: give numbers of shape {self.shape}") from None
-        if vertices.shape != self.shape:
-            raise InputError(f"vertices have shape {vertices.shape}: give {self.shape}, as the mesh has")
-        with np.errstate(invalid="ignore", over="ignore"):
-            flat = ((vertices - self.anchor) / self.scale).astype(np.float32).ravel()
-        if flat.size == 0:
-            return types().Float()
-        return (
-            types().Float(flat) + opaque_zero()
-        )  # in Dr.Jit's own memory: frozen kernels are particular about alignment
-
-    def rays(self, rays: Ray) -> tuple[Any, Any, Any]:
-        """World rays (N, 3) in the mesh's frame: world axes, from the anchor, in units of the scale."""
-        t = types()
-        origin = (np.asarray(rays.origin, np.float64) - self.anchor) / self.scale
-        origin, along = (np.ascontiguousarray(x.T, np.float32) for x in (origin, np.asarray(rays.direction)))
-        return t.Array3f(origin), t.Array3f(along), t.Bool(np.ascontiguousarray(rays.valid))
-
-    def view(self, origin: Any, direction: Any, valid: Any) -> PosedRays:
-        """Rays of the mesh's frame, one per pixel, as what hits were found with: in scene units, from the anchor."""
-        import drjit as dr
-
-        pose = np.eye(4)
-        pose[:3, 3] = -self.anchor
-        ray = Ray(origin * opaque_numbers([self.scale])[0], direction, valid)
-        dr.eval(*ray)  # of a named tuple it would do nothing
-        return PosedRays(pose, ray)
+    def ordered(self, mesh: Mesh) -> tuple[Any, Any]:
+        """Numbers and corners of the triangles of this mesh, neighbors together; worked out once, before it moves."""
+        if self.base is not None:
+            assert isinstance(mesh, MovedMesh) and mesh.base is not None
+            return self.base.ordered(mesh.base)
+        if self._ordered is None:
+            with np.errstate(invalid="ignore", over="ignore"):
+                order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
+            faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
+            self._ordered = types().UInt(order.astype(np.uint32)), types().UInt(faces)
+        return self._ordered
 
     def pose(self, frame_from_world: Any) -> list[Any]:
         """Rotation (9) and shift (3) from device vertices to a frame in units of `scale`, opaque.
@@ -72,6 +57,53 @@ class DeviceMesh:
         matrix = np.asarray(frame_from_world, np.float64)
         shift = (matrix[:3, :3] @ self.anchor + matrix[:3, 3]) / self.scale
         return opaque_numbers([*matrix[:3, :3].ravel(), *shift])
+
+
+def in_frame(vertices: np.ndarray, anchor: np.ndarray, scale: float) -> Any:
+    """Positions (V, 3) around an anchor (3,) in units of a scale, uploaded: a flat Float."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        flat = ((vertices - anchor) / scale).astype(np.float32).ravel()
+    if flat.size == 0:
+        return types().Float()
+    return types().Float(flat) + opaque_zero()  # in Dr.Jit's own memory: frozen kernels are particular about alignment
+
+
+def _used(mesh: Mesh) -> np.ndarray | None:
+    """Vertices that faces use, None for all: others must not widen the range."""
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces] = True
+    return None if used.all() else np.flatnonzero(used)
+
+
+def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float]:
+    """Anchor (3,) and scale of positions (V, 3): of all, or of where most are if some are very far away.
+
+    The scale is a power of two, the anchor a multiple of an eighth of it.
+    """
+    ends = np.array([_ends(vertices[:, i]) for i in range(3)])
+    low, high = ends[:, 0], ends[:, 1]
+    if not np.isfinite(ends).all():
+        vertices = vertices[np.isfinite(vertices).all(axis=1)]
+        if len(vertices) == 0:
+            return np.zeros(3), 1.0
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+    center, extent = 0.5 * low + 0.5 * high, float((0.5 * high - 0.5 * low).max())
+    sample = vertices[:: max(len(vertices) // _SAMPLE, 1)]
+    middle = np.median(sample, axis=0)
+    usual = 4.0 * float(np.median(np.abs(sample - middle).max(axis=1)))
+    if 0 < usual and extent > _FAR * usual:
+        center, extent = middle, usual
+    if extent == 0:
+        return center, 1.0
+    scale = float(2.0 ** np.clip(np.ceil(np.log2(extent)), -1000, 1000))
+    step = scale / 8
+    with np.errstate(over="ignore", invalid="ignore"):
+        snapped = np.rint(center / step) * step
+    return np.where(np.isfinite(snapped), snapped, center), scale
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
 _meshes: weakref.WeakKeyDictionary[Mesh, DeviceMesh] = weakref.WeakKeyDictionary()

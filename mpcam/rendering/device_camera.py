@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, types
+from mpcam.backend import opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.profiles import Profile
-from mpcam.cameras.types import PosedRays
+from mpcam.cameras.types import PosedRays, Ray
 from mpcam.errors import InputError
 from mpcam.math import library
 from mpcam.rendering.pixel_rays import pixel_rays
@@ -161,3 +161,16 @@ def around(camera: Camera, anchor: np.ndarray) -> np.ndarray:
     pose = np.array(camera.camera_from_world, np.float64)
     pose[:3, 3] -= anchor
     return pose
+
+
+def world_rays(rays: Ray) -> PosedRays:
+    """Rays in the world, origin (N, 3), direction (N, 3), valid (N,), on the device around their middle."""
+    t, valid = types(), np.ascontiguousarray(rays.valid, bool)
+    origin, direction = np.asarray(rays.origin, np.float64), np.asarray(rays.direction, np.float64)
+    pose = np.eye(4)
+    if valid.any():
+        pose[:3, 3] = -0.5 * (origin[valid].min(axis=0) + origin[valid].max(axis=0))
+    origin = np.where(valid[:, None], origin + pose[:3, 3], 0.0)
+    columns = (np.ascontiguousarray(x.T, np.float32) for x in (origin, direction))
+    start, along = (t.Array3f(x) + opaque_zero() for x in columns)
+    return PosedRays(pose, Ray(start, along, t.Bool(valid) & (opaque_zero() == 0)))

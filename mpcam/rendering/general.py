@@ -7,26 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, types
+from mpcam.backend import exclusive, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.order import nearby
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh
 from mpcam.rendering.device_camera import around
 from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
+from mpcam.rendering.moving import Moving
 from mpcam.rendering.ray_blocks import DeviceRays
 from mpcam.rendering.registry import CULLING, CULLS, RAY_BOUNDS
 
 MOST_PAIRS = 1 << 32
 
 
-class GeneralRasterizer:
+class GeneralRasterizer(Moving):
     """Frames of a mesh through any camera that gives rays.
 
     bound: "tight" takes what the pixels' own rays exclude, block by block. For camera triangles also "triangle", the
@@ -54,12 +53,10 @@ class GeneralRasterizer:
             raise InputError(f"bound={bound!r}: allowed are {', '.join(RAY_BOUNDS)}")
         if isinstance(culling, str) or not set(culling) <= set(CULLING):
             raise InputError(f"culling={culling!r}: give some or none of {', '.join(CULLING)}, as a tuple")
-        self.mesh, self.output, self.bound, self.cull = mesh, output, bound, cull
+        self.output, self.bound, self.cull = output, bound, cull
         self.culling = tuple(name for name in CULLING if name in culling)
-        self.device = device_mesh(mesh)
-        self.vertices, self.faces = self.device.vertices, self.device.faces
-        self.order = _ordered(mesh, self.device)
-        self.unit = opaque_numbers([self.device.scale])[0]
+        self._prepare_mesh(mesh)
+        self.order = self.device.ordered(mesh)
         self.aim(camera)
 
     @exclusive
@@ -86,10 +83,8 @@ class GeneralRasterizer:
         """What the hierarchy begins with."""
         return self.rays.blocks.group_cones if self.bound == "tight" else self.rays.blocks.planes.cones
 
-    @exclusive
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
-        self.vertices = self.device.place(np.asarray(vertices))
+    def _reframed(self) -> None:
+        self.aim(self.camera)
 
     def run(self, done: Callable[[str, Any], None] | None = None, count: bool = False) -> tuple[Any, Any]:
         """Keys of all slots, and counters or None; done(stage, arrays) is told of each stage."""
@@ -140,9 +135,7 @@ class GeneralRasterizer:
             tests, rendered = self._count(vertices, rays, pose)
             return Stats(int(tests), int(rendered))
 
-        return Hits(
-            camera, self.mesh, self.method, triangle, depth, weights, stats, vertices, lambda: rays.posed(camera)
-        )
+        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.posed(camera))
 
     @exclusive
     def _count(self, vertices: Any, rays: DeviceRays, pose: Any) -> np.ndarray:
@@ -150,16 +143,6 @@ class GeneralRasterizer:
         other = copy.copy(self)
         other.vertices, other.rays, other.pose = vertices, rays, pose
         return other.run(count=True)[1].numpy()
-
-
-def _ordered(mesh: Mesh, device: DeviceMesh) -> tuple[Any, Any]:
-    """Numbers and corners of the triangles, neighbors together; worked out once for a mesh."""
-    if device.ordered is None:
-        with np.errstate(invalid="ignore", over="ignore"):
-            order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
-        faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
-        device.ordered = types().UInt(order.astype(np.uint32)), types().UInt(faces)
-    return device.ordered
 
 
 @functools.lru_cache(maxsize=32)

@@ -38,7 +38,8 @@ class Hits:
 
     triangle: (H, W) int32 face numbers, -1 where nothing is hit. depth: (H, W) float32 distance along the pixel's ray
     (unit direction), scene units, infinite where nothing is hit. barycentric: (H, W, 2) float32 weights of the
-    triangle's second and third corner (the first has the rest to 1), 0 where nothing is hit. stats: work counts.
+    triangle's second and third corner (the first has the rest to 1), 0 where nothing is hit. stats: work counts. mesh:
+    with its vertices where they were in this frame.
     """
 
     def __init__(
@@ -50,12 +51,10 @@ class Hits:
         depth: Any,
         weights: Callable[[], tuple[Any, Any]],
         stats: Callable[[], Stats],
-        vertices: Any,
         view: Callable[[], PosedRays] | None = None,
     ):
         self.camera, self.mesh, self.method = camera, mesh, method
         self.device_triangle, self.device_depth = triangle, depth
-        self.device_vertices = vertices  # those of the frame: scenes move
         self._weights, self._stats, self._view = weights, stats, view
 
     @cached_property

@@ -2,8 +2,6 @@
 
 from typing import Any, Literal, Protocol, Unpack, overload
 
-import numpy as np
-
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import HasRays, need
 from mpcam.errors import InputError
@@ -20,8 +18,14 @@ Output = Literal["hits", "depth", "coverage"]
 class Prepared(Protocol):
     """One camera, mesh and method, ready to give frames."""
 
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the mesh's vertices, world frame."""
+    def update(self, vertices: Any = None, *, normals: Any = None, transform: Any = None) -> None:
+        """The scene elsewhere: new vertices (V, 3), or a list with one array for each of its meshes, and normals to go
+        with them; or a rigid 4x4 transform. See `Moving.update`.
+        """
+        ...
+
+    def move(self, mesh: Mesh) -> None:
+        """The mesh as it is now, of the same faces: see `mpcam.geometry.moved.moved`."""
         ...
 
     def aim(self, camera: Camera) -> None:

@@ -4,82 +4,102 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import PosedRays, Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import DeviceMesh, device_mesh
-from mpcam.rendering.device_camera import posed_rays
+from mpcam.rendering.device import in_frame
+from mpcam.rendering.device_camera import posed_rays, world_rays
 from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
+from mpcam.rendering.moving import Moving
 from mpcam.tracing.meshes import mitsuba_mesh, move, position_key
 from mpcam.tracing.variant import mitsuba
 
 
-def rays_in_rows(camera: Camera, device: DeviceMesh) -> tuple[Any, Any, Any]:
-    """Origin, direction and validity of the rays of all pixels, row by row, in the frame of a device mesh."""
-    if isinstance(camera, CameraTriangles):
-        posed = device_rays(camera, device).posed(camera)
-    else:
-        posed = posed_rays(camera)
-    (origin, direction, valid), pose, scale = posed.ray, device.pose(posed.pose), 1.0 / device.scale
-    moved = [origin[i] * scale - pose[9 + i] for i in range(3)]
-    columns = [[pose[3 * j + i] for j in range(3)] for i in range(3)]
-    world = [sum(columns[i][j] * moved[j] for j in range(3)) for i in range(3)]
-    return world, [sum(columns[i][j] * direction[j] for j in range(3)) for i in range(3)], valid
+def rays_around(posed: PosedRays, origin: np.ndarray, unit: float) -> tuple[Any, Any, Any]:
+    """Origin, direction and validity of rays, row by row, in world axes around a point (3,) in a unit."""
+    rotation, middle = posed.pose[:3, :3], frame_origin(posed.pose)
+    numbers = opaque_numbers([*rotation.ravel(), *((middle - origin) / unit), 1.0 / unit])
+    columns, shift, scale = [numbers[i:9:3] for i in range(3)], numbers[9:12], numbers[12]
+
+    def turned(vector: Any) -> list[Any]:
+        return [sum(column[j] * vector[j] for j in range(3)) for column in columns]
+
+    start = turned(posed.ray.origin)
+    return [start[i] * scale + shift[i] for i in range(3)], turned(posed.ray.direction), posed.ray.valid
 
 
-class RayTraced:
+class RayTraced(Moving):
     """Frames by tracing each pixel's ray through a tree over the triangles.
 
-    The same rays and the same float32 vertices as the kernels use. Triangles with a corner that is not
-    finite are left out of the tree, which may not hold such numbers. rays: others than the camera's, in the world, one
-    for each of its pixels, row by row: origin (N, 3), unit direction (N, 3), valid (N,).
+    Rays and vertices are brought to float32 around the point that the rays leave from, or the middle of these: not as
+    the other methods do it, so that comparing with them shows what rounding costs either. Triangles with a corner that
+    is not finite are left out of the tree, which may not hold such numbers. rays: others than the camera's, in the
+    world, one for each of its pixels, row by row: origin (N, 3), unit direction (N, 3), valid (N,).
     """
 
     method = "raytrace"
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh, rays: Ray | None = None):
-        self.mesh, self.own_rays = mesh, rays is None
-        self.device: DeviceMesh = device_mesh(mesh)
-        self._look(camera, rays)
-        self._build(mesh.vertices)
+        self._prepare_mesh(mesh)
+        self._given, self.camera = rays, camera
+        self._posed = self._own_rays() if rays is None else world_rays(rays)
+        self._origin = frame_origin(self._posed.pose)
+        self._build()
+        self._look()
 
     @exclusive
     def aim(self, camera: Camera) -> None:
-        """Another camera, or another pose of it: the tree stays as it is. Raises InputError where rays were given."""
-        if not self.own_rays:
-            raise InputError("these frames are of rays that were given, not of a camera's: prepare anew")
-        self._look(camera, None)
+        """Another camera, or another pose of it: the tree stays as it is, unless it is too far away for float32.
 
-    def _look(self, camera: Camera, rays: Ray | None) -> None:
+        Raises InputError where rays were given.
+        """
+        if self._given is not None:
+            raise InputError("these frames are of rays that were given, not of a camera's: prepare anew")
+        self.camera, self._posed = camera, self._own_rays()
+        middle = frame_origin(self._posed.pose)
+        if np.abs(middle - self._origin).max() > self._unit:
+            self._origin = middle
+            self._build()
+        self._look()
+
+    def _own_rays(self) -> PosedRays:
+        """Those of the camera; of camera triangles around the mesh's anchor, so that rays may start on its faces."""
+        if isinstance(self.camera, CameraTriangles):
+            return device_rays(self.camera, self.device).posed(self.camera)
+        return posed_rays(self.camera)
+
+    def _look(self) -> None:
+        """The rays around the origin, in its unit."""
         import drjit as dr
 
-        self.camera = camera
         with mitsuba() as mi:
-            world, along, valid = rays_in_rows(camera, self.device) if rays is None else self.device.rays(rays)
+            world, along, valid = rays_around(self._posed, self._origin, self._unit)
             self._ray = mi.Ray3f(mi.Point3f(*map(mi.Float, world)), mi.Vector3f(*map(mi.Float, along)))
             self._valid = mi.Bool(valid)
             dr.eval(self._ray, self._valid)
 
-    def _build(self, vertices: np.ndarray) -> None:
+    def _build(self) -> None:
         """A scene of the faces whose corners are finite."""
         import drjit as dr
 
+        mesh, self._unit = self.mesh, self.device.scale
         with np.errstate(invalid="ignore", over="ignore"):
-            finite = np.isfinite(vertices[self.mesh.faces]).all(axis=(1, 2))
+            finite = np.isfinite(mesh.corners).all(axis=(1, 2))
         self._kept = None if finite.all() else types().UInt(np.flatnonzero(finite).astype(np.uint32))
-        faces = self.mesh.faces if self._kept is None else self.mesh.faces[finite]
+        faces = mesh.faces if self._kept is None else mesh.faces[finite]
         self._scene: Any = None
         self._parameters: Any = None
-        positions = self._positions = self.device.place(vertices)
         if len(faces) == 0:
             return
+        positions = in_frame(mesh.vertices, self._origin, self._unit)
         with mitsuba() as mi:
             shape = mitsuba_mesh(mi, "mesh", dr.select(dr.isfinite(positions), positions, 0.0), faces)
             self._scene = mi.load_dict({"type": "scene", "mesh": shape})
@@ -87,21 +107,29 @@ class RayTraced:
             self._key = position_key(self._parameters)
 
     @exclusive
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the vertices: uploads them and rebuilds the tree."""
-        positions = self._positions = self.device.place(vertices)
-        if self._scene is None or self._kept is not None or not np.isfinite(vertices).all():
-            self._build(np.asarray(vertices, np.float64))  # other faces may be finite now
+    def move(self, mesh: Mesh) -> None:
+        """See `Moving.move`: uploads the vertices and rebuilds the tree."""
+        before = self.device
+        self._hold(mesh)
+        framed = before.scale == self.device.scale and bool((before.anchor == self.device.anchor).all())
+        if not framed:
+            if isinstance(self.camera, CameraTriangles) and self._given is None:
+                self._posed = self._own_rays()
+                self._origin = frame_origin(self._posed.pose)
+            self._unit = self.device.scale
+            self._look()
+        if self._scene is None or self._kept is not None or not np.isfinite(mesh.vertices).all():
+            self._build()  # other faces may be finite now
             return
         with mitsuba() as mi:
-            move(self._parameters, self._key, mi.Float(positions))
+            move(self._parameters, self._key, mi.Float(in_frame(mesh.vertices, self._origin, self._unit)))
 
     @exclusive
     def frame(self) -> Hits:
         """One frame, evaluated."""
         import drjit as dr
 
-        t = types()
+        t, posed = types(), self._posed
         with mitsuba() as mi:
             if self._scene is None:
                 count = self.camera.width * self.camera.height
@@ -114,7 +142,7 @@ class RayTraced:
                 if self._kept is not None:
                     number = dr.gather(t.UInt, self._kept, number, t.Bool(hit))
                 triangle = dr.select(t.Bool(hit), t.Int(number), -1)
-                depth = dr.select(t.Bool(hit), t.Float(dr.detach(found.t)) * self.device.scale, dr.inf)
+                depth = dr.select(t.Bool(hit), t.Float(dr.detach(found.t)) * self.unit, dr.inf)
                 second, third = (dr.select(t.Bool(hit), t.Float(dr.detach(w)), 0.0) for w in found.prim_uv)
             dr.eval(triangle, depth, second, third)
             del mi
@@ -126,14 +154,8 @@ class RayTraced:
             depth,
             lambda: (second, third),
             lambda: Stats(0, 0),
-            self._positions,
-            None if self.own_rays else self._view,
+            lambda: posed,
         )
-
-    def _view(self) -> PosedRays:
-        t = types()
-        origin, direction = (t.Array3f(*(t.Float(x) for x in part)) for part in (self._ray.o, self._ray.d))
-        return self.device.view(origin, direction, t.Bool(self._valid))
 
     @exclusive
     def stages(self) -> dict[str, float]:

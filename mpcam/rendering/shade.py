@@ -10,6 +10,7 @@ import numpy as np
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.geometry.moved import MovedMesh
 from mpcam.rendering.device import device_mesh
 from mpcam.rendering.hits import Hits
 from mpcam.scene.scene import DirectionalLight, PointLight, Scene
@@ -22,25 +23,14 @@ class Attributes:
 
     def __init__(self, mesh: Mesh):
         # The table must not keep its own key alive: only arrays of the mesh are held, not the mesh.
-        self._faces, self._normals, self._uv, self._colors = mesh.faces, mesh.normals, mesh.uv, mesh.colors
-        self._face_normals, self._materials, self._face_material = mesh.face_normals, mesh.materials, mesh.face_material
-        self.smooth, self.textured = mesh.normals is not None, any(m.texture is not None for m in mesh.materials)
-        self.textured = self.textured and mesh.uv is not None
+        self._faces, self._uv, self._colors = mesh.faces, mesh.uv, mesh.colors
+        self._materials, self._face_material = mesh.materials, mesh.face_material
+        self.textured = any(m.texture is not None for m in mesh.materials) and mesh.uv is not None
         self.tinted = mesh.colors is not None
 
     @functools.cached_property
     def faces(self) -> Any:
         return types().UInt(self._faces.ravel().astype(np.uint32))
-
-    @functools.cached_property
-    def normals(self) -> Any:
-        """3 numbers per vertex, or per face where the mesh has no shading normals."""
-        return _upload(self._normals if self._normals is not None else self._face_normals)
-
-    @functools.cached_property
-    def face_normals(self) -> Any:
-        """3 numbers per face."""
-        return _upload(self._face_normals) if self.smooth else self.normals
 
     @functools.cached_property
     def uv(self) -> Any:
@@ -88,6 +78,16 @@ def attributes(mesh: Mesh) -> Attributes:
     if found is None:
         found = _attributes[mesh] = Attributes(mesh)
     return found
+
+
+_normals: weakref.WeakKeyDictionary[Mesh, Any] = weakref.WeakKeyDictionary()
+
+
+def vertex_normals(mesh: Mesh) -> Any:
+    """3 numbers per vertex on the device, or None for a mesh that has no shading normals."""
+    if mesh not in _normals:
+        _normals[mesh] = None if mesh.normals is None else _upload(mesh.normals)
+    return _normals[mesh]
 
 
 @exclusive
@@ -158,20 +158,24 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
         if shading != "color" and table.textured:
             data["texels"], data["textures"] = table.textures
             data["uv"] = table.uv
+    smooth = False
     if shading in ("normal", "light"):
-        ray = hits.view.ray
-        data |= {"normals": table.normals, "pose": _rotation(hits), "direction": ray.direction}
+        # Where a mesh has moved, its own normals count, else those of the scene, which may be dressed up otherwise.
+        normals = vertex_normals(hits.mesh if isinstance(hits.mesh, MovedMesh) else scene.mesh)
+        smooth = normals is not None
+        data |= {"normals": normals} if smooth else {}
+        data |= {"vertices": device_mesh(hits.mesh).vertices, "pose": _rotation(hits)}
+        data |= {"direction": hits.view.ray.direction}
     kinds: tuple[str, ...] = ()
     if shading == "light":
         kinds = tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
         data["ambient"] = opaque_numbers(list(scene.ambient))
         data["lights"] = [_light_numbers(light, hits) for light in scene.lights]
         if "point" in kinds or shadows:
-            data["vertices"], data["scale"] = hits.device_vertices, opaque_numbers([device_mesh(hits.mesh).scale])[0]
+            data["scale"] = opaque_numbers([device_mesh(hits.mesh).scale])[0]
         if shadows:
-            data["face_normals"] = table.face_normals
             data["shadows"] = [one.on_device(device_mesh(hits.mesh).anchor) for one in shadows]
-    kernel = _kernel(shading, kinds, table.smooth)
+    kernel = _kernel(shading, kinds, smooth)
     return kernel(hits.device_triangle, weights, data)
 
 
@@ -212,8 +216,11 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
             if "uv" in data:
                 color *= _texture(t, data, material, mixed(t.Array2f, data["uv"]), hit)
         if shading in ("normal", "light"):
-            normal = mixed(t.Array3f, data["normals"]) if smooth else dr.gather(t.Array3f, data["normals"], face, hit)
-            normal *= dr.rsqrt(dr.maximum(dr.squared_norm(normal), 1e-30))
+            a, b, c = (dr.gather(t.Array3f, data["vertices"], corner, hit) for corner in corners)
+            flat = normal = _unit(dr.cross(b - a, c - a))
+            if smooth:
+                normal = mixed(t.Array3f, data["normals"])
+                normal = dr.select(dr.squared_norm(normal) > 0, _unit(normal), flat)
             pose, d = data["pose"], data["direction"]
             back = t.Array3f(*(-(pose[i] * d[0] + pose[3 + i] * d[1] + pose[6 + i] * d[2]) for i in range(3)))
             normal = dr.select(dr.dot(normal, back) < 0, -normal, normal)
@@ -223,11 +230,20 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
                 color *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
             else:
                 # From what is hit, not along the ray, which may be bent; from the anchor, where float32 is dense.
-                point = mixed(t.Array3f, data["vertices"]) * data["scale"] if "vertices" in data else None
-                color *= _lit(t, data, lights, normal, point, face, hit)
+                point = (a * mix[0] + b * mix[1] + c * mix[2]) * data["scale"] if "scale" in data else None
+                color *= _lit(t, data, lights, normal, point, flat)
         return dr.select(hit, color, _unhit(t, data))
 
     return kernel
+
+
+def _unit(vector: Any) -> Any:
+    """Of length 1 however small it is; (0, 0, 0) stays."""
+    import drjit as dr
+
+    largest = dr.maximum(dr.maximum(abs(vector.x), abs(vector.y)), abs(vector.z))
+    scaled = vector * dr.select(largest > 0, 1.0 / largest, 0.0)
+    return scaled * dr.rsqrt(dr.maximum(dr.squared_norm(scaled), 1e-30))
 
 
 def _rotation(hits: Hits) -> list[Any]:
@@ -270,13 +286,12 @@ def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> 
     return dr.select(some, upper * (1 - fy) + lower * fy, 1.0)
 
 
-def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, point: Any, face: Any, hit: Any) -> Any:
+def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, point: Any, flat: Any) -> Any:
     """Light that arrives, for a white surface: ambient and Lambert's law for each light that is not in shadow."""
     import drjit as dr
 
     total, reached = t.Array3f(*data["ambient"]), [True] * len(lights)
     if "shadows" in data:
-        flat = dr.gather(t.Array3f, data["face_normals"], face, hit)
         reached = [shadow.visible(point, flat) for shadow in data["shadows"]]
     for kind, numbers, lit in zip(lights, data["lights"], reached, strict=True):
         place, strength = t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:])

@@ -14,11 +14,11 @@ from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device import device_mesh
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.maps import CoverageMap, DepthMap
+from mpcam.rendering.moving import Moving
 from mpcam.rendering.outlines import HIDDEN_TESTS, OUTLINES, PIECES, hidden_never
 
 MOST_PIXELS = 32767  # along a side: kernels keep two pixel numbers in 32 bits
@@ -59,7 +59,7 @@ def kernel_test(name: str) -> Any:
     return importlib.import_module(f"mpcam_kernels.{name}")
 
 
-class ZBuffered:
+class ZBuffered(Moving):
     """Frames of one camera and mesh by a depth buffer.
 
     test: "ray_triangle" (rays through one point against triangles in the camera frame), "pixel_triangle" (pixels
@@ -75,9 +75,7 @@ class ZBuffered:
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh):
-        self.mesh, self.device = mesh, device_mesh(mesh)
-        self.vertices, self.faces = self.device.vertices, self.device.faces
-        self.unit = opaque_numbers([self.device.scale])[0]
+        self._prepare_mesh(mesh)
         self.aim(camera)
 
     @exclusive
@@ -96,10 +94,8 @@ class ZBuffered:
         """The test that serves a camera; raises InputError where none does."""
         raise TypeError(f"{type(self).__name__} must define test_for")
 
-    @exclusive
-    def update(self, vertices: np.ndarray) -> None:
-        """New positions (V, 3) of the vertices, for a moving scene; nothing but their upload is needed."""
-        self.vertices = self.device.place(np.asarray(vertices))
+    def _reframed(self) -> None:
+        self.pose = self.device.pose(self.camera.camera_from_world)
 
     def place(self, vertices: Any) -> list[Any]:
         """Device vertices to what the kernels take, a list of arrays with four numbers per vertex.
@@ -237,7 +233,7 @@ class ZBuffered:
             tests, rendered = self.count(positions)
             return Stats(int(tests), int(rendered))
 
-        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.vertices, self.view)
+        return Hits(self.camera, self.mesh, self.method, triangle, depth, weights, stats, self.view)
 
 
 @functools.cache
