@@ -21,14 +21,16 @@ def moving_vertices(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
         return vertices, vertices + swing
 
 
-def moving_frame(prepared: Any, positions: Sequence[np.ndarray]) -> Callable[[], object]:
-    """A frame that starts with new vertices: each call takes the next of `positions`."""
+def moving_frame(
+    prepared: Any, positions: Sequence[np.ndarray], normals: np.ndarray | None = None
+) -> Callable[[], object]:
+    """A frame that starts with new vertices: each call takes the next of `positions`. normals: if it is shaded."""
     count = 0
 
     def frame() -> object:
         nonlocal count
         count += 1
-        prepared.update(positions[count % len(positions)])
+        prepared.update(positions[count % len(positions)], normals=normals)
         return prepared.frame()
 
     return frame

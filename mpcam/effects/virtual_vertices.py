@@ -35,6 +35,8 @@ class VirtualVertices(VertexProjected):
     other levels.
     """
 
+    looks_from_eye = False  # but by way of the camera triangles
+
     def __init__(self, camera: Camera, mesh: Mesh, cams: CameraTriangles, rays: Ray, level: int = 0):
         super().__init__(camera, mesh, level)
         self.cams, view = with_directions(cams), world_rays(rays)

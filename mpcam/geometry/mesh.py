@@ -149,12 +149,12 @@ class Mesh:
         return np.cross(e1, e2)
 
     @cached_property
-    def follows_faces(self) -> bool:
-        """Whether all shading normals are those of the faces around, to float32, so that they can be made anew."""
+    def follows_faces(self) -> np.ndarray:
+        """(V,) whether the shading normal is that of the faces around, to float32, so that it can be made anew."""
         if self.normals is None:
-            return True
-        given = self.normals.any(axis=1)
-        return bool(np.allclose(self.normals[given], self.smooth_normals()[given], rtol=0.0, atol=1e-6))
+            return np.ones(len(self.vertices), bool)
+        near = np.abs(self.normals - self.smooth_normals()).max(axis=1, initial=0.0) <= 1e-6
+        return near | ~self.normals.any(axis=1)
 
     def smooth_normals(self) -> np.ndarray:
         """(V, 3) unit vertex normals, the area-weighted mean over the faces of each vertex.

@@ -61,15 +61,45 @@ def moved(mesh: Mesh, vertices: Any = None, normals: Any = None, transform: Any 
 
 def _after(mesh: Mesh, vertices: np.ndarray) -> np.ndarray | None:
     """Shading normals of a mesh after its vertices moved."""
-    if mesh.normals is None or np.array_equal(vertices, mesh.vertices, equal_nan=True):
-        return mesh.normals
-    if mesh.follows_faces:
-        smooth = Mesh(vertices, mesh.faces).smooth_normals()
-        return np.where(mesh.normals.any(axis=1, keepdims=True), smooth, 0.0)
-    raise InputError(
-        "the vertices moved, and the mesh's normals were given, not made from its faces, so they are not known any "
-        "more: pass update(vertices, normals=...) or update(transform=...), or shade by 'color' or 'texture'"
-    )
+    if mesh.normals is None:
+        return None
+    normals, bent = np.array(mesh.normals), []
+    for span in _spans(mesh):
+        turn = _rotation(mesh.vertices[span], vertices[span])
+        if turn is None:
+            bent.append(span)
+        else:
+            normals[span] = normals[span] if np.array_equal(turn, np.eye(3)) else normals[span] @ turn.T
+    if not bent:
+        return normals
+    smooth = Mesh(vertices, mesh.faces).smooth_normals()
+    for span in bent:
+        if not mesh.follows_faces[span].all():
+            raise InputError(
+                "the vertices moved, and the mesh's normals were given, not made from its faces, so they are not known "
+                "any more: pass update(vertices, normals=...) or update(transform=...), or shade by 'color'"
+            )
+        given = mesh.normals[span].any(axis=1, keepdims=True)
+        normals[span] = np.where(given, smooth[span], 0.0)
+    return normals
+
+
+def _rotation(before: np.ndarray, after: np.ndarray) -> np.ndarray | None:
+    """The rotation (3, 3) of a rigid motion between positions (N, 3), to rounding; None where they were bent."""
+    with np.errstate(invalid="ignore"):
+        usable = np.isfinite(before - after).all(axis=1)
+    a, b = before[usable], after[usable]
+    if len(a) == 0:
+        return np.eye(3)
+    size = float(np.abs(a - a.mean(axis=0)).max())
+    tolerance = 1e-12 * size + 1e-15 * float(max(np.abs(a).max(), np.abs(b).max()))
+    if np.ptp(b - a, axis=0).max() <= tolerance:
+        return np.eye(3)
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    left, _, right = np.linalg.svd(a.T @ b)
+    # Of a flat part the third axis is free: it is the one that makes a rotation.
+    turn = (left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right).T
+    return turn if np.abs(a @ turn.T - b).max() <= 1e3 * tolerance else None
 
 
 def _carried(mesh: Mesh, transform: Any) -> Mesh:

@@ -11,6 +11,8 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import MovedMesh
 from mpcam.geometry.order import nearby
 
+FAR = 64.0
+"""Scales from the anchor, and times the nearest vertex, from which a camera is far away."""
 _SAMPLE = 4096  # vertices that tell where most of a mesh is
 _FAR = 64.0  # a mesh that reaches so many times farther than most of its vertices has something far away
 
@@ -23,25 +25,50 @@ class DeviceMesh:
     that they stay where they are while the mesh moves a little.
     """
 
-    def __init__(self, mesh: Mesh):
+    def __init__(self, mesh: Mesh, frame: tuple[np.ndarray, float] | None = None):
+        """frame: an anchor and a scale to take instead of those that fit the mesh."""
         t = types()
-        base = mesh.base if isinstance(mesh, MovedMesh) else None
-        self.base = None if base is None else device_mesh(base)  # that of the mesh before it moved, or None
-        self._used = _used(mesh) if self.base is None else self.base._used
-        self.shape = mesh.vertices.shape
-        self.anchor, self.scale = _frame(mesh.vertices if self._used is None else mesh.vertices[self._used])
+        base = mesh.base if isinstance(mesh, MovedMesh) else mesh if frame else None
+        self.base = None if base is None else device_mesh(base)  # of the mesh before it moved, or with its own frame
+        self.used = _used(mesh) if self.base is None else self.base.used
+        self.anchor, self.scale = frame or _frame(self.used_of(mesh))
         if self.base is None:
             self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
         else:
             self.faces = self.base.faces
         self.vertices = in_frame(mesh.vertices, self.anchor, self.scale)
         self._ordered: Any = None
+        self._near: DeviceMesh | None = None
+
+    def used_of(self, mesh: Mesh) -> np.ndarray:
+        """Those of the mesh's vertices that faces use."""
+        return mesh.vertices if self.used is None else mesh.vertices[self.used]
+
+    def stands_apart(self, mesh: Mesh, point: np.ndarray) -> float | None:
+        """How far a point (3,) is from the nearest vertex, if it is far from most of them but right before some."""
+        away = float(np.abs(point - self.anchor).max())
+        if away <= FAR * self.scale:
+            return None
+        with np.errstate(invalid="ignore", over="ignore"):
+            gaps = np.abs(self.used_of(mesh) - point).max(axis=1)
+        nearest = float(np.min(gaps, initial=np.inf, where=np.isfinite(gaps)))
+        return nearest if nearest < away / FAR else None
+
+    def near(self, mesh: Mesh, point: np.ndarray) -> "DeviceMesh":
+        """The mesh as a camera at a point (3,) needs it: in a frame around the point where that stands apart."""
+        nearest = self.stands_apart(mesh, point)
+        if nearest is None:
+            return self
+        scale = float(2.0 ** np.ceil(np.log2(8.0 * nearest))) if nearest > 0 else self.scale
+        anchor = np.rint(point / scale) * scale
+        if self._near is None or self._near.scale != scale or (self._near.anchor != anchor).any():
+            self._near = DeviceMesh(mesh, (anchor, scale))
+        return self._near
 
     def ordered(self, mesh: Mesh) -> tuple[Any, Any]:
         """Numbers and corners of the triangles of this mesh, neighbors together; worked out once, before it moves."""
         if self.base is not None:
-            assert isinstance(mesh, MovedMesh) and mesh.base is not None
-            return self.base.ordered(mesh.base)
+            return self.base.ordered((isinstance(mesh, MovedMesh) and mesh.base) or mesh)
         if self._ordered is None:
             with np.errstate(invalid="ignore", over="ignore"):
                 order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)

@@ -12,8 +12,9 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device_camera import around
+from mpcam.rendering.device_camera import around, posed_rays
 from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
@@ -66,6 +67,8 @@ class GeneralRasterizer(Moving):
             raise InputError(
                 f"bound={self.bound!r} is for camera triangles, not for a {type(camera).__name__}: use bound='tight'"
             )
+        if not isinstance(camera, CameraTriangles):
+            self._look_from(frame_origin(posed_rays(camera).pose))
         self.camera, self.rays = camera, device_rays(camera, self.device, self.bound != "tight")
         self.pose = self.device.pose(around(camera, self.rays.anchor))
         from mpcam_kernels.candidates import levels

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from mpcam.backend import exclusive, opaque_numbers
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import moved
@@ -16,15 +18,23 @@ class Moving:
 
     mesh: Mesh
     device: DeviceMesh
+    faces: Any
+    _point: np.ndarray | None
 
     def _prepare_mesh(self, mesh: Mesh) -> None:
-        self._start = mesh
+        self._start, self._point = mesh, None
         self._hold(mesh)
+        self.faces = self.device.faces
 
     def _hold(self, mesh: Mesh) -> None:
-        self.mesh, self.device = mesh, device_mesh(mesh)
-        self.vertices, self.faces = self.device.vertices, self.device.faces
-        self.unit = opaque_numbers([self.device.scale])[0]
+        self.mesh, device = mesh, device_mesh(mesh)
+        self.device = device if self._point is None else device.near(mesh, self._point)
+        self.vertices, self.unit = self.device.vertices, opaque_numbers([self.device.scale])[0]
+
+    def _look_from(self, point: np.ndarray) -> None:
+        """The point (3,) around which the camera needs the mesh to be exact."""
+        self._point = point
+        self._hold(self.mesh)
 
     @exclusive
     def update(self, vertices: Any = None, *, normals: Any = None, transform: Any = None) -> None:

@@ -51,9 +51,18 @@ class RayTraced(Moving):
         self._prepare_mesh(mesh)
         self._given, self.camera = rays, camera
         self._posed = self._own_rays() if rays is None else world_rays(rays)
-        self._origin = frame_origin(self._posed.pose)
+        self._origin = self._near()
         self._build()
         self._look()
+
+    def _near(self) -> np.ndarray:
+        """The point that all is put around: near that of the rays, and the same for cameras near to each other."""
+        middle, unit = frame_origin(self._posed.pose), self.device.scale
+        if isinstance(self.camera, CameraTriangles) and self._given is None:
+            return middle
+        if self.device.stands_apart(self.mesh, middle) is not None:
+            return middle
+        return np.rint(middle / unit) * unit
 
     @exclusive
     def aim(self, camera: Camera) -> None:
@@ -63,9 +72,10 @@ class RayTraced(Moving):
         """
         if self._given is not None:
             raise InputError("these frames are of rays that were given, not of a camera's: prepare anew")
-        self.camera, self._posed = camera, self._own_rays()
-        middle = frame_origin(self._posed.pose)
-        if np.abs(middle - self._origin).max() > self._unit:
+        self.camera = camera
+        self._posed = self._own_rays()
+        middle = self._near()
+        if (middle != self._origin).any():
             self._origin = middle
             self._build()
         self._look()
@@ -111,12 +121,10 @@ class RayTraced(Moving):
         """See `Moving.move`: uploads the vertices and rebuilds the tree."""
         before = self.device
         self._hold(mesh)
-        framed = before.scale == self.device.scale and bool((before.anchor == self.device.anchor).all())
-        if not framed:
-            if isinstance(self.camera, CameraTriangles) and self._given is None:
+        if before.scale != self.device.scale or (before.anchor != self.device.anchor).any():
+            if self._given is None:
                 self._posed = self._own_rays()
-                self._origin = frame_origin(self._posed.pose)
-            self._unit = self.device.scale
+            self._origin, self._unit = self._near(), self.device.scale
             self._look()
         if self._scene is None or self._kept is not None or not np.isfinite(mesh.vertices).all():
             self._build()  # other faces may be finite now

@@ -40,11 +40,7 @@ class VertexProjected(ZBuffered):
         self.level = level
         self.parts = Subdivision(2**self.level)
         self.corners = self.faces  # of the whole triangles
-        self.faces = self._tessellated = self.parts.faces(self.corners, mesh.triangle_count)
-
-    def move(self, mesh: Mesh) -> None:
-        super().move(mesh)
-        self.faces = self._tessellated
+        self.faces = self.parts.faces(self.corners, mesh.triangle_count)
 
     def test_for(self, camera: Camera) -> str:
         instead = "use method='invert' or 'raytrace'"

@@ -13,6 +13,7 @@ from mpcam.cameras.outline import HIDDEN
 from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
+from mpcam.math.pose import frame_origin
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.explanation import Step
@@ -72,6 +73,7 @@ class ZBuffered(Moving):
     output: str = "hits"
     cull: str = "none"
     view: Callable[[], PosedRays] | None = None
+    looks_from_eye: ClassVar[bool] = True
 
     @exclusive
     def __init__(self, camera: Camera, mesh: Mesh):
@@ -88,6 +90,8 @@ class ZBuffered(Moving):
         self.camera, self.test, self.curved = camera, test, test == "ray_triangle"
         self.device_camera = device_camera(camera)
         self.samples = self.device_camera.directions if self.curved else self.device_camera.centers
+        if self.looks_from_eye:
+            self._look_from(frame_origin(camera.camera_from_world))
         self.pose = self.device.pose(camera.camera_from_world)
 
     def test_for(self, camera: Camera) -> str:

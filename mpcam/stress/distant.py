@@ -21,6 +21,16 @@ WIDTHS = (1.2, 0.3, 0.05)
 
 SIZE, TRIANGLES = 256, 20480
 
+APART = "a face far away"
+PLACE = (448262.0, 5411933.0, 118.0)
+"""Map coordinates, as surveys have them: float32 tells them apart to half a unit."""
+FACES = (
+    ((0.0, 0.0, 0.0),) * 3,
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    ((1e9, 0.0, 1e9), (0.0, 1e9, 1e9), (1e9, 1e9, 0.0)),
+)
+"""Corners of faces of no area, of usual size, and huge."""
+
 Factory = Callable[[float, float], Camera]
 """Of a distance and a half width: a camera that far away, with an image that shows about that much to each side."""
 
@@ -37,7 +47,8 @@ def focal_length(distance: float, width: float) -> float:
 
 def distant_cases(factory: Factory) -> list[Case]:
     """One case for each distance, over all widths, at any orientation; for every camera that can be rasterized."""
-    return [(f"distant eyes, {distance:g}", partial(_rows, factory, distance)) for distance in DISTANCES]
+    cases: list[Case] = [(f"distant eyes, {d:g}", partial(_rows, factory, d)) for d in DISTANCES]
+    return [*cases, (APART, partial(_apart, factory))]
 
 
 def _rows(factory: Factory, distance: float) -> list[StressRow]:
@@ -46,9 +57,31 @@ def _rows(factory: Factory, distance: float) -> list[StressRow]:
     return [StressRow("distant", f"distant eyes, {distance:g}", "float32", pixels, float("nan"), missed, invented)]
 
 
-def distant(camera: Camera, distance: float) -> tuple[int, int, int]:
-    """Pixels that are sure, missed, and invented or at a wrong depth; by `invert`, of the unit sphere's mesh."""
+def _apart(factory: Factory) -> list[StressRow]:
+    """The scene at map coordinates, with one more face that is far away and out of view, by `invert` and by tracing."""
+    camera, counts = factory(10.0, WIDTHS[0]), np.zeros(3, int)
+    pose = np.array(camera.camera_from_world, np.float64)
+    pose[:3, 3] -= pose[:3, :3] @ np.array(PLACE)
+    there = camera.with_pose(pose)
+    for corners in FACES:
+        for method in ("invert", "raytrace"):
+            counts += distant(there, 10.0, PLACE, corners, method)
+    return [StressRow("distant", APART, "float32", int(counts[0]), float("nan"), int(counts[1]), int(counts[2]))]
+
+
+def distant(
+    camera: Camera,
+    distance: float,
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    face: tuple[tuple[float, float, float], ...] = (),
+    method: str = "invert",
+) -> tuple[int, int, int]:
+    """Pixels that are sure, missed, and invented or at a wrong depth, of the unit sphere's mesh around a place (3,).
+
+    face: the corners of one more face in the world, out of view.
+    """
     from mpcam.geometry.builtin import builtin_mesh
+    from mpcam.geometry.mesh import Mesh
     from mpcam.rendering.methods import rasterize
 
     mesh = builtin_mesh("sphere", triangles=TRIANGLES)
@@ -58,10 +91,13 @@ def distant(camera: Camera, distance: float) -> tuple[int, int, int]:
     outer = float(np.linalg.norm(mesh.vertices, axis=1).max())
     slack = 1e-6 * distance  # what float32 makes of points so far away
 
-    hits = rasterize(camera, mesh, method="invert")
+    there = Mesh(mesh.vertices + place, mesh.faces)
+    if face:
+        there = Mesh.concatenate([there, Mesh(face, [(0, 1, 2)])])
+    hits = rasterize(camera, there, method)
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     ray = camera.ray(np.stack([u, v], -1))
-    origin, direction = np.asarray(ray.origin), np.asarray(ray.direction)
+    origin, direction = np.asarray(ray.origin) - place, np.asarray(ray.direction)
     nearest = -(origin * direction).sum(-1)
     passing = np.linalg.norm(origin + nearest[..., None] * direction, axis=-1)
     found, depth = np.asarray(hits.triangle) >= 0, np.asarray(hits.depth, np.float64)
