@@ -48,6 +48,8 @@ def load_obj(path: Path, say: Say) -> Mesh:
     index = _indices(rows.corners, path)
     for column, (name, table) in enumerate((("v", position), ("vt", texcoord), ("vn", normal))):
         named = index[:, column]
+        if column and len(table) and named.max() < 0:
+            say(f"no face names a {_WORDS[name]}: the {len(table)} {name} lines are not used")
         if column and len(table) == 0 and named.max() >= 0:
             say(f"faces name {name} numbers, but the file has no {name} lines: they are left out")
             named[:] = -1

@@ -13,6 +13,7 @@ from mpcam.geometry.mesh import Material, Mesh
 from mpcam.geometry.polygons import triangulate
 
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_NORMAL = ("nx", "ny", "nz")
 _UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 
 
@@ -28,6 +29,8 @@ def load_ply(path: Path, say: Say) -> Mesh:
     unused = [name for name, table in tables.items() if table.count and name not in ("vertex", "face", "tristrips")]
     if unused:
         say(f"the elements {', '.join(unused)} are not used")
+    _say_unused("vertices", vertex, say)
+    _say_unused("faces", face, say)
     position = _columns(vertex, ("x", "y", "z"))
     if position is None:
         raise InputError(f"{path} has no vertices with x, y and z: it is of another kind")
@@ -74,6 +77,20 @@ def load_ply(path: Path, say: Say) -> Mesh:
     return Mesh(position[own], inverse.reshape(-1, 3), shading, uv, color, materials, material_of)
 
 
+def _say_unused(what: str, table: Table, say: Say) -> None:
+    """Say what else vertices or faces have; faces need no normals, and an alpha that is opaque is none."""
+    used = {"x", "y", "z", *_NORMAL, "texnumber"}.union(*_COLORS, *_UV)
+    for name, values in table.columns.items():
+        top = np.iinfo(table.kinds[name]).max if table.kinds[name].kind in "iu" else 1
+        if name == "alpha" and np.all(values == top):
+            used.add(name)
+    others = [name for name in table.columns if name not in used]
+    names = [name for name in table.lists if name not in ("vertex_indices", "vertex_index", "texcoord")]
+    others += names[1:] if len(names) == len(table.lists) and what == "faces" else names
+    if others and table.count:
+        say(f"numbers of {what} are not used: {', '.join(others)}")
+
+
 def _columns(table: Table, names: tuple[str, ...]) -> np.ndarray | None:
     if not all(name in table.columns for name in names):
         return None
@@ -94,7 +111,7 @@ def _color(table: Table, say: Say) -> np.ndarray | None:
 
 def _normals(vertex: Table, position: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
     """Unit normals; those of the faces where the file's have no direction."""
-    normals = _columns(vertex, ("nx", "ny", "nz"))
+    normals = _columns(vertex, _NORMAL)
     return None if normals is None else unit_normals(normals, position, faces)
 
 
