@@ -96,24 +96,23 @@ def _libraries(path: Path, libraries: list[str], say: Say) -> tuple[dict[str, En
 
 def _files(folder: Path, line: str) -> list[tuple[str, Path | None]]:
     """The files on a mtllib line: names with spaces between, which may have spaces and quotes themselves."""
-    words = line.split()
-    whole = find_file(folder, line)
+    whole = find_file(folder, line, moved=False)
     if whole is not None:
         return [(line, whole)]
+    words = line.split()
     found: list[tuple[str, Path | None]] = []
-    while words:
-        if words[0].startswith("#"):
-            break
+    while words and not words[0].startswith("#"):
         for count in range(len(words), 0, -1):
             name = " ".join(words[:count])
-            file = find_file(folder, name)
+            file = find_file(folder, name, moved=False)
             if file is not None:
                 break
         else:
             # up to where a name plainly ends
             ends = [k for k, word in enumerate(words, 1) if word.strip("\"'").lower().endswith(".mtl")]
             count = ends[0] if ends else len(words)
-            name, file = " ".join(words[:count]).strip("\"'"), None
-        found.append((name, file))
+            name = " ".join(words[:count])
+            file = find_file(folder, name)
+        found.append((names_meant(name)[-1], file))
         words = words[count:]
     return found

@@ -54,15 +54,15 @@ def names_meant(text: str) -> list[str]:
     return names
 
 
-def find_file(folder: Path, text: str) -> Path | None:
+def find_file(folder: Path, text: str, moved: bool = True) -> Path | None:
     """The file that a name at the end of a line means, as seen from the folder; None if there is none.
 
-    Either slash will do, and so will letters in another case; of a path that is not there, as one of another machine,
-    the last part is looked for in the folder.
+    Either slash will do, and so will letters in another case. moved: of a path that is not there, as one of another
+    machine, the last part is looked for in the folder.
     """
     for name in names_meant(text):
         written = Path(name.replace("\\", "/"))
-        for path in (folder / written, folder / written.name):
+        for path in (folder / written, folder / written.name)[: 1 + moved]:
             found = _in_any_case(path) if path.name else None
             if found is not None:
                 return found
