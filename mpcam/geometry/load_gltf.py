@@ -125,7 +125,7 @@ def _faces(file: GltfFile, primitive: Primitive, count: int) -> np.ndarray:
     if primitive.mode == 6:
         return np.stack([index[1:-1], index[2:], np.full(max(len(index) - 2, 0), index[0])], axis=1)
     faces = np.stack([index[:-2], index[1:-1], index[2:]], axis=1)
-    faces[1::2] = faces[1::2][:, [1, 0, 2]]
+    faces[1::2] = faces[1::2][:, [0, 2, 1]]
     return faces
 
 

@@ -33,12 +33,18 @@ class GltfFile:
         self._chunk: bytes | None = None
         self._buffers: dict[int, bytes] = {}
         text = decode_text(self._json(path.read_bytes()))
-        head = msgspec.json.decode(text, type=dict[str, Any])
+        try:
+            head = msgspec.json.decode(text, type=dict[str, Any])
+        except msgspec.MsgspecError as error:
+            raise ValueError(str(error)) from None
         asset = head.get("asset", {})
         version = str(asset.get("minVersion") or asset.get("version", "")) if isinstance(asset, dict) else ""
         if not re.match(r"2\.0$|2$", version):
             raise InputError(f"{path} is of glTF version {version or 'none'}: export it as glTF 2.0")
-        self.root = msgspec.convert(head, Root, strict=False)
+        try:
+            self.root = msgspec.convert(head, Root, strict=False)
+        except msgspec.MsgspecError as error:
+            raise ValueError(str(error)) from None
         self._check_extensions()
 
     def _json(self, data: bytes) -> bytes:

@@ -113,6 +113,6 @@ def _files(folder: Path, line: str) -> list[tuple[str, Path | None]]:
             count = ends[0] if ends else len(words)
             name = " ".join(words[:count])
             file = find_file(folder, name)
-        found.append((names_meant(name)[-1], file))
+        found.append(((names_meant(name) or [name])[-1], file))
         words = words[count:]
     return found

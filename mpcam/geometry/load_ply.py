@@ -163,7 +163,7 @@ def _strips(table: Table) -> np.ndarray:
             for strip in np.split(row, np.flatnonzero(row == -1)):
                 strip = strip[strip != -1]
                 triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
-                triangles[1::2] = triangles[1::2, [1, 0, 2]]
+                triangles[1::2] = triangles[1::2][:, [0, 2, 1]]
                 a, b, c = triangles.T
                 # those without area that join two strips
                 faces.append(triangles[(a != b) & (b != c) & (c != a)])
