@@ -41,11 +41,17 @@ def load_ply(path: Path, say: Say) -> Mesh:
     if color is not None and tint is not None:
         say("vertices have colors, and faces too: those of the faces are not used")
         tint = None
-    uv, corner_uv = _first(vertex, _UV), _corner_uv(face, corners, polygon, say)
+    uv, corner_uv = _first(vertex, _UV), _corner_uv(face, corners, polygon)
     materials, material_of = _materials(path, comments, face, polygon, color is not None or tint is not None, say)
-    if uv is None and corner_uv is None and any(material.texture is not None for material in materials):
-        say("it has a texture, but no texture coordinates: it is drawn without the texture")
-        materials, material_of = (Material((1.0, 1.0, 1.0)),), np.zeros(len(faces), np.int64)
+    if any(material.texture is not None for material in materials):
+        if uv is None and corner_uv is None:
+            say("it has a texture, but no texture coordinates: it is drawn without the texture")
+            materials, material_of = (Material((1.0, 1.0, 1.0)),), np.zeros(len(faces), np.int64)
+        elif corner_uv is not None and (bare := np.isnan(corner_uv).any(axis=(1, 2))).any():
+            count = len(np.unique(polygon[bare]))
+            say(f"{count} faces have no texture coordinates: they are drawn without the texture")
+            material_of = np.where(bare, len(materials), material_of)
+            materials += (Material((1.0, 1.0, 1.0)),)
     material_of = np.concatenate([material_of, np.zeros(len(strips), np.int64)]) if len(materials) > 1 else None
     everything = np.concatenate([faces, strips])
     normals = _normals(vertex, position, everything)
@@ -57,7 +63,7 @@ def load_ply(path: Path, say: Say) -> Mesh:
     keys[:, 0] = everything.ravel()
     table = np.zeros((1, 2))
     if corner_uv is not None:
-        table, numbers = np.unique(corner_uv.reshape(-1, 2), axis=0, return_inverse=True)
+        table, numbers = np.unique(np.nan_to_num(corner_uv).reshape(-1, 2), axis=0, return_inverse=True)
         keys[: len(faces) * 3, 1] = numbers.reshape(-1)
         uv = None
     if tint is not None:
@@ -170,8 +176,8 @@ def _strips(table: Table) -> np.ndarray:
     return np.concatenate(faces) if faces else np.zeros((0, 3), np.int64)
 
 
-def _corner_uv(face: Table, corners: np.ndarray, polygon: np.ndarray, say: Say) -> np.ndarray | None:
-    """(F, 3, 2) texture coordinates at the corners of triangles; 0 for faces whose list is of another length."""
+def _corner_uv(face: Table, corners: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
+    """(F, 3, 2) texture coordinates at the corners of triangles; NaN for faces whose list is of another length."""
     if "texcoord" not in face.lists or len(polygon) == 0:
         return None
     lengths, flat = face.lists["texcoord"]
@@ -179,14 +185,12 @@ def _corner_uv(face: Table, corners: np.ndarray, polygon: np.ndarray, say: Say) 
     whole = lengths == 2 * counts
     if not whole.any():
         return None
-    if not whole.all():
-        say(f"{np.count_nonzero(~whole)} faces have no texture coordinates at all corners: they are 0 there")
     # corners count over all faces; within its face a corner has the same place in both lists
     place = corners - (np.cumsum(counts) - counts)[polygon][:, None]
     at = (np.cumsum(lengths) - lengths)[polygon][:, None] + 2 * place
     at = np.where(whole[polygon][:, None], at, 0)
     uv = np.stack([flat[at], flat[np.minimum(at + 1, len(flat) - 1)]], axis=2)
-    return np.where(whole[polygon][:, None, None], uv, 0.0)
+    return np.where(whole[polygon][:, None, None], uv, np.nan)
 
 
 def _materials(

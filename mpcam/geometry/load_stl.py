@@ -12,8 +12,8 @@ from mpcam.geometry.mesh import Material, Mesh
 from mpcam.geometry.polygons import triangulate
 from mpcam.math.srgb import linear_from_srgb
 
-_NUMBER = r"[^\s]+"
-_PARTS = re.compile(rf"\b(facet)\s+normal\b|\bvertex\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})|\bend\s*(facet)\b")
+# numbers stand on the line of their vertex; a name may hold any of these words
+_PARTS = re.compile(r"\b(facet)\s+normal\b|\bvertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)|\bend\s*(facet)\b")
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
 
 
