@@ -233,6 +233,7 @@ def test_colors_of_binary_stl(tmp_path):
 @pytest.mark.parametrize(
     ("data", "said"),
     [
+        ("solid a\nendsolid a\n", "no triangles"),
         (f"solid\n{FACET}", "cut off"),
         (f"solid\n{FACET}{FACET[:60]}", "cut off"),
         (f"solid\n{FACET.replace('  vertex 0 1 0', '')}endsolid\n", "without three corners"),

@@ -30,7 +30,7 @@ def load_stl(path: Path, say: Say) -> Mesh:
     if len(data) >= 84 and len(data) == length:
         return _binary(data, count)
     text = decode_text(data).lower()
-    if re.search(r"^\s*(solid|facet)", text) and re.search(r"\bfacet\s+normal\b", text):
+    if re.search(r"^\s*(solid|facet)", text) and re.search(r"\bfacet\s+normal\b|\bend\s*solid\b", text):
         return _text(text, path, say)
     if count and len(data) > length:
         if data[length:].strip(b"\0\r\n\t \x1a"):
@@ -60,16 +60,15 @@ def _binary(data: bytes, count: int) -> Mesh:
 
 
 def _text(text: str, path: Path, say: Say) -> Mesh:
-    parts = list(_PARTS.finditer(text))
-    opened = np.array([part[1] is not None for part in parts])
-    closed = np.array([part[5] is not None for part in parts])
-    if opened.sum() != closed.sum() or not re.search(r"\bend\s*solid\b", text[parts[-1].end() :]):
+    parts = _PARTS.findall(text)
+    opened, closed = (np.array([part[k] != "" for part in parts], bool) for k in (0, 4))
+    if opened.sum() != closed.sum() or not re.search(r"\bend\s*solid\b", text[max(text.rfind("facet"), 0) :]):
         raise ValueError("the text was cut off")
     corner = ~opened & ~closed
     try:
-        points = np.array([part.group(2, 3, 4) for part in parts if part[2] is not None], np.float64).reshape(-1, 3)
+        points = np.array([part[1:4] for part in parts if part[1]], np.float64).reshape(-1, 3)
     except ValueError:
-        bad = next(part for part in parts if part[2] is not None and not all(map(_is_number, part.group(2, 3, 4))))
+        bad = next(part for part in _PARTS.finditer(text) if part[2] and not all(map(_is_number, part.group(2, 3, 4))))
         line = text.count("\n", 0, bad.start()) + 1
         raise InputError(f"{path} line {line}: {' '.join(bad[0].split())[:60]!r} is not three numbers") from None
     counts = np.bincount((np.cumsum(opened) - 1)[corner], minlength=int(opened.sum()))
