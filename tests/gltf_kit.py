@@ -14,7 +14,7 @@ class Writer:
     """A file in the making: `add` puts arrays into its buffer, `node` meshes into its scene."""
 
     def __init__(self):
-        self.file = gl.GLTF2(scene=0, scenes=[gl.Scene(nodes=[])], buffers=[gl.Buffer(byteLength=0)])
+        self.file: Any = gl.GLTF2(scene=0, scenes=[gl.Scene(nodes=[])], buffers=[gl.Buffer(byteLength=0)])
         self.data = b""
 
     def view(self, data: bytes, stride: int | None = None) -> int:

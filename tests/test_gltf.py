@@ -4,6 +4,7 @@ import base64
 import itertools
 import json
 import struct
+from typing import Any
 
 import numpy as np
 import pygltflib as gl
@@ -51,7 +52,7 @@ def test_every_type_of_number(tmp_path, form, index):
             attributes["COLOR_0"] = writer.add(raw, kind, normalized, padding)
         indices = None if index is None else writer.add(faces.reshape(-1, 1), index)
         writer.node(writer.mesh(attributes, indices))
-        mesh = load_mesh(writer.save(tmp_path / ("a.glb" if form == "glb" else "a.gltf"), form))
+        mesh: Any = load_mesh(writer.save(tmp_path / ("a.glb" if form == "glb" else "a.gltf"), form))
         np.testing.assert_array_equal(mesh.corners, positions[faces])
         for found, expected in ((mesh.normals, directions if normals else None), (mesh.colors, colors)):
             assert (found is None) == (expected is None)
@@ -208,7 +209,7 @@ def test_primitives_that_share_vertices_keep_their_own(tmp_path):
     writer.file.meshes = [gl.Mesh(primitives=primitives)]
     writer.file.materials = [gl.Material(name="a"), gl.Material(name="b")]
     writer.node(0)
-    mesh = load_mesh(writer.save(tmp_path / "a.glb", "glb"))
+    mesh: Any = load_mesh(writer.save(tmp_path / "a.glb", "glb"))
     assert len(mesh.vertices) == 18
     assert [mesh.materials[k].name for k in mesh.face_material] == ["a", "b"] * 3
 

@@ -10,6 +10,7 @@ import numpy as np
 import plyfile
 import pytest
 import trimesh
+from trimesh.visual import ColorVisuals, TextureVisuals
 
 from mpcam import Mesh, load_mesh
 
@@ -141,14 +142,14 @@ def test_ply_by_plyfile(tmp_path, encoding, kind):
         check(load_mesh(file), given, given.normals if normals else None, coordinates, expected)
 
 
-def as_trimesh(given: Truth, normals: bool, uv: bool, colors: bool) -> trimesh.Trimesh:
+def as_trimesh(given: Truth, normals: bool, uv: bool, colors: bool) -> Any:
     mesh = trimesh.Trimesh(
         given.vertices, given.triangles, vertex_normals=given.normals if normals else None, process=False
     )
     if uv:
-        mesh.visual = trimesh.visual.TextureVisuals(uv=given.uv)
+        mesh.visual = TextureVisuals(uv=given.uv)
     elif colors:
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=given.colors)
+        mesh.visual = ColorVisuals(mesh, vertex_colors=given.colors)
     return mesh
 
 

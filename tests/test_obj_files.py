@@ -3,6 +3,7 @@
 import codecs
 import io
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ def png(color=(255, 255, 255)) -> bytes:
     return stream.getvalue()
 
 
-def load(folder, text, **files):
+def load(folder, text, **files) -> Any:
     """The mesh of a text; files: names with _ for the dot, and their content."""
     for name, content in files.items():
         data = content if isinstance(content, bytes) else content.encode()

@@ -2,6 +2,7 @@
 
 import io
 import struct
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 
-def load(folder, name: str, data: bytes | str):
+def load(folder, name: str, data: bytes | str) -> Any:
     (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
     return load_mesh(folder / name)
 
