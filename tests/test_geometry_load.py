@@ -274,6 +274,8 @@ def test_gltf_that_is_compressed_is_refused(tmp_path):
         ("a.obj", b"v 0 0 0\nf 1 2 3\n", "number 3"),
         ("a.obj", b"v 0 0 0\nf 0 1 1\n", "start at 1"),
         ("a.obj", b"v 0 0 0\nf -1 -2 -3\n", "first vertex"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nf -1 -2 -3\n", "first vertex"),
+        ("a.obj", b"v 0 0 0\nvt 0 0\nf 1/-1 1/-2 1/-1\n", "first texture coordinate"),
         ("a.obj", b"v 0 0 0\nf 1/x 1 1\n", "v/vt"),
         ("a.obj", b"v 0 0\nf 1 1 1\n", "needs 3"),
         ("a.obj", b"v 0 0 zero\nf 1 1 1\n", "not a number"),

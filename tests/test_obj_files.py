@@ -215,7 +215,7 @@ def test_colors_that_are_none(tmp_path):
 
 @pytest.mark.parametrize(
     ("face", "missing"),
-    [("1/1/1 2/2/2 3/3/3", ["vt", "vn"]), ("1//1 2//2 3//3", ["vn"]), ("-3/-1 -2/-1 -1/-1", [])],
+    [("1/1/1 2/2/2 3/3/3", ["vt", "vn"]), ("1//1 2//2 3//3", ["vn"]), ("-3/-1 -2/-1 -1/-1", ["vt"])],
 )
 def test_faces_that_name_rows_which_are_not_there(tmp_path, face, missing):
     with warnings.catch_warnings(record=True) as said:

@@ -185,6 +185,8 @@ FACET = "facet normal 0 0 1\n outer loop\n  vertex 0 0 0\n  vertex 1 0 0\n  vert
         f"solid a\n{FACET}endsolid a\n".upper(),
         f"solid a\n{FACET}end solid a",
         f"Solid vertex facet\n{FACET}EndSolid",
+        f"solid vertex 1 2 3 facet normal\n{FACET}endsolid",
+        f"solid {' '.join(FACET.split())} endsolid",
         f"solid\n{FACET}endsolid\n".replace("\n", "\r"),
         f"solid\n{FACET}endsolid\n".replace("\n", "\r\n\t"),
         f"\ufeffsolid\n{FACET}endsolid\n",

@@ -48,9 +48,9 @@ def load_obj(path: Path, say: Say) -> Mesh:
     index = _indices(rows.corners, path)
     for column, (name, table) in enumerate((("v", position), ("vt", texcoord), ("vn", normal))):
         named = index[:, column]
-        if column and len(table) and named.max() < 0:
-            say(f"no face names a {_WORDS[name]}: the {len(table)} {name} lines are not used")
-        if column and len(table) == 0 and named.max() >= 0:
+        if name == "vn" and len(table) and np.all(named == -1):
+            say(f"no face names a normal: the {len(table)} vn lines are not used")
+        if column and len(table) == 0 and np.any(named != -1):
             say(f"faces name {name} numbers, but the file has no {name} lines: they are left out")
             named[:] = -1
         if named.max() >= len(table):
@@ -154,8 +154,9 @@ def _from_start(parts: list[str], tables: tuple[list, ...]) -> list[str]:
         pieces = part.split("/")
         for k, table in zip(range(len(pieces)), tables, strict=False):
             if re.fullmatch(r"-\d+", pieces[k]):
-                # one step before the first row is 0, and more are below
-                pieces[k] = str(len(table) + 1 - int(pieces[k][1:]))
+                number = len(table) + 1 - int(pieces[k][1:])
+                # 0 stands for none; before the first row is below
+                pieces[k] = str(number if number > 0 else number - 1)
         result.append("/".join(pieces))
     return result
 

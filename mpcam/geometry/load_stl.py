@@ -60,7 +60,8 @@ def _binary(data: bytes, count: int) -> Mesh:
 
 
 def _text(text: str, path: Path, say: Say) -> Mesh:
-    parts = _PARTS.findall(text)
+    name = re.match(r"\s*solid[^\n]*\n(?=.*facet)", text, re.DOTALL)
+    parts = _PARTS.findall(text, name.end() if name else 0)
     opened, closed = (np.array([part[k] != "" for part in parts], bool) for k in (0, 4))
     if opened.sum() != closed.sum() or not re.search(r"\bend\s*solid\b", text[max(text.rfind("facet"), 0) :]):
         raise ValueError("the text was cut off")
