@@ -86,8 +86,9 @@ def test_texture_coordinates_at_corners_in_text(tmp_path):
     with pytest.warns(UserWarning, match="texture gone.png does not exist"):
         load(tmp_path, "a.ply", data.replace(b"one.png", b"gone.png"))
     bare = ply("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n", VERTEX, FACE, comments="comment TextureFile one.png")
-    with pytest.warns(UserWarning, match="no texture coordinates: it is drawn without the texture"):
-        assert load(tmp_path, "a.ply", bare).materials[0].texture is None
+    with pytest.warns(UserWarning, match="2 faces have no texture coordinates: they are drawn without the texture"):
+        mesh = load(tmp_path, "a.ply", bare)
+    assert all(mesh.materials[k].texture is None for k in mesh.face_material)
     partly = data.replace(b"3 0 2 3 6 0.25 0.25 1 1 0 1", b"3 0 2 3 0")
     with pytest.warns(UserWarning, match="1 faces have no texture coordinates: they are drawn without the texture"):
         mesh = load(tmp_path, "a.ply", partly)

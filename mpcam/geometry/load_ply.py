@@ -44,10 +44,8 @@ def load_ply(path: Path, say: Say) -> Mesh:
     uv, corner_uv = _first(vertex, _UV), _corner_uv(face, corners, polygon)
     materials, material_of = _materials(path, comments, face, polygon, color is not None or tint is not None, say)
     if any(material.texture is not None for material in materials):
-        if uv is None and corner_uv is None:
-            say("it has a texture, but no texture coordinates: it is drawn without the texture")
-            materials, material_of = (Material((1.0, 1.0, 1.0)),), np.zeros(len(faces), np.int64)
-        elif corner_uv is not None and (bare := np.isnan(corner_uv).any(axis=(1, 2))).any():
+        bare = np.full(len(faces), uv is None) if corner_uv is None else np.isnan(corner_uv).any(axis=(1, 2))
+        if bare.any():
             count = len(np.unique(polygon[bare]))
             say(f"{count} faces have no texture coordinates: they are drawn without the texture")
             material_of = np.where(bare, len(materials), material_of)
@@ -55,20 +53,36 @@ def load_ply(path: Path, say: Say) -> Mesh:
     material_of = np.concatenate([material_of, np.zeros(len(strips), np.int64)]) if len(materials) > 1 else None
     everything = np.concatenate([faces, strips])
     normals = _normals(vertex, position, everything)
-    if corner_uv is None and tint is None:
-        return Mesh(position, everything, normals, uv, color, materials, material_of)
+    own, numbers = np.arange(len(position)), everything
+    if corner_uv is not None or tint is not None:
+        own, numbers, uv, color = _split(everything, corner_uv, tint, polygon, uv, color)
+    shading = None if normals is None else normals[own]
+    return Mesh(position[own], numbers, shading, uv, color, materials, material_of)
 
-    # one vertex per combination of place, texture coordinate and color of the face
-    keys = np.full((len(everything) * 3, 3), -1, np.int64)
-    keys[:, 0] = everything.ravel()
+
+def _split(
+    triangles: np.ndarray,
+    corner_uv: np.ndarray | None,
+    tint: np.ndarray | None,
+    polygon: np.ndarray,
+    uv: np.ndarray | None,
+    color: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """One vertex per combination of place, texture coordinate at the corner and color of the face that occurs.
+
+    triangles: (F, 3) vertices, those of polygons first. corner_uv: (P, 3, 2) of those. tint: a color for each polygon;
+    polygon: (P,) that of each triangle. uv, color: of the file's vertices. Returns the file's vertex of each new one,
+    the triangles in new ones, and uv and color of those.
+    """
+    keys = np.full((triangles.size, 3), -1, np.int64)
+    keys[:, 0] = triangles.ravel()
     table = np.zeros((1, 2))
     if corner_uv is not None:
         table, numbers = np.unique(np.nan_to_num(corner_uv).reshape(-1, 2), axis=0, return_inverse=True)
-        keys[: len(faces) * 3, 1] = numbers.reshape(-1)
-        uv = None
+        keys[: len(polygon) * 3, 1] = numbers.reshape(-1)
     if tint is not None:
         tint, numbers = np.unique(tint, axis=0, return_inverse=True)
-        keys[: len(faces) * 3, 2] = np.repeat(numbers.reshape(-1)[polygon], 3)
+        keys[: len(polygon) * 3, 2] = np.repeat(numbers.reshape(-1)[polygon], 3)
     rows, inverse = np.unique(keys, axis=0, return_inverse=True)
     own = rows[:, 0]
     if corner_uv is not None:
@@ -79,8 +93,7 @@ def load_ply(path: Path, say: Say) -> Mesh:
         color = np.where(rows[:, 2:] >= 0, tint[rows[:, 2]], 1.0)
     elif color is not None:
         color = color[own]
-    shading = None if normals is None else normals[own]
-    return Mesh(position[own], inverse.reshape(-1, 3), shading, uv, color, materials, material_of)
+    return own, inverse.reshape(-1, 3), uv, color
 
 
 def _say_unused(what: str, table: Table, say: Say) -> None:
