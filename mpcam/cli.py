@@ -4,6 +4,7 @@ import csv
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: done. 1: this machine lacks something, see `mpcam doctor`. 2: a mistake in what was given. 130: interrupted.
     """
+    form, warnings.formatwarning = warnings.formatwarning, _one_line
     try:
         status = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
@@ -48,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILURE
+    finally:
+        warnings.formatwarning = form
     return status or 0
 
 
@@ -339,6 +343,11 @@ def doctor(*, json: bool = False) -> int:
     else:
         Console(width=None if sys.stdout.isatty() else 100).print(table(checks))
     return 0 if is_fit(checks) else EXIT_FAILURE
+
+
+def _one_line(message: Warning | str, *where: Any) -> str:
+    """A warning as people read it, without the line of code that it is about."""
+    return f"mpcam: {' '.join(str(message).split())}\n"
 
 
 def _complain(error: object, status: int) -> int:

@@ -52,7 +52,7 @@ def check_llvm() -> None:
 
 def examine() -> list[Check]:
     """Ask everything, which takes some seconds. Nothing that fails here can take the caller down."""
-    modules = ("OpenImageIO", "jax", "optimistix", "trimesh")
+    modules = ("OpenImageIO", "jax", "mapbox_earcut", "optimistix")
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         others = pool.map(_check_module, modules)
         backend = _check_drjit()

@@ -21,8 +21,8 @@ NAMES = [
     "Mitsuba",
     "OpenImageIO",
     "jax",
+    "mapbox_earcut",
     "optimistix",
-    "trimesh",
 ]
 
 

@@ -32,7 +32,7 @@ from mpcam.geometry.surfaces import Surface
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.methods import prepare
-from mpcam.rendering.shade import shade
+from mpcam.rendering.shade import attributes, shade
 from mpcam.scene.scene import PointLight, Scene
 
 CHUNK = 1 << 22
@@ -270,7 +270,8 @@ class Caustics:
         hits, scene = self.hits, self.seen_scene
         maps = self._shadows(shadow_size) if shadows and shading == "light" else ()
         receives = (hits.triangle >= 0) & (hits.triangle < self.scene.mesh.triangle_count)
-        added = np.where(receives[..., None], shade(hits, scene, "texture") * self.irradiance, 0.0)
+        albedo = shade(hits, scene, "texture" if attributes(scene.mesh).textured else "color")
+        added = np.where(receives[..., None], albedo * self.irradiance, 0.0)
         return shade(hits, scene, shading, maps) + added.astype(np.float32)
 
     def _shadows(self, size: int) -> tuple[Any, ...]:

@@ -1,6 +1,7 @@
 """Texture images: from 8-bit or 16-bit sRGB pixels to linear float32."""
 
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -17,15 +18,22 @@ def linear_texture(image) -> np.ndarray:
     return table[np.asarray(image.convert("RGB"))]
 
 
-def read_texture(path: Path) -> np.ndarray:
-    """The image file as (H, W, 3) float32 linear RGB. Raises InputError if it is missing or not an image."""
+def read_texture(source: Path | IO[bytes], name: str = "") -> tuple[np.ndarray, bool]:
+    """The image as (H, W, 3) float32 linear RGB, and whether some of it is transparent.
+
+    source: the file, or its bytes as a stream, called by the name. Raises InputError if it is not an image.
+    """
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
-            return linear_texture(image)
-    except FileNotFoundError:
-        raise InputError(f"texture {path} does not exist: put the image there or correct the material file") from None
-    except (OSError, ValueError, SyntaxError):
+        with Image.open(source) as image:
+            return linear_texture(image), _transparent(image)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         # SyntaxError is what PIL raises for damaged PNG files
-        raise InputError(f"texture {path} is not a readable image: use PNG or JPEG") from None
+        raise InputError(f"texture {name or source} is not a readable image: use PNG or JPEG") from None
+
+
+def _transparent(image) -> bool:
+    if image.mode in ("RGBA", "LA", "PA"):
+        return image.getchannel("A").getextrema()[0] < 255
+    return "transparency" in image.info

@@ -1,6 +1,7 @@
 """Colors of first hits: one kernel that gathers what the chosen shading needs, and nothing else."""
 
 import functools
+import warnings
 import weakref
 from collections.abc import Sequence
 from typing import Any
@@ -149,6 +150,8 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
         dr.eval(color)
         return color
     table, weights = attributes(scene.mesh), hits.device_weights
+    if shading == "texture" and not table.textured:
+        warnings.warn(f"shading='texture': {scene.name!r} has no texture, so this is 'color'", stacklevel=4)
     data: dict[str, Any] = {"faces": table.faces, "background": background}
     if scene.environment is not None:
         data |= _environment(hits, scene)

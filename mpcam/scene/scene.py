@@ -1,6 +1,7 @@
 """A scene: meshes, lights, and the camera that looks at them."""
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -85,8 +86,8 @@ class Scene:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """All meshes as one, faces in order; built once."""
-        return Mesh.concatenate(self.meshes, name=self.name)
+        """All meshes as one, faces in order; built once. Textures of meshes without uv are left out, with a warning."""
+        return Mesh.concatenate(map(_drawable, self.meshes), name=self.name)
 
     @staticmethod
     def of(x) -> "Scene":
@@ -98,6 +99,17 @@ class Scene:
         if isinstance(x, (list, tuple)):
             return Scene(tuple(x))
         raise InputError(f"a {type(x).__name__} is not a scene: give a Scene, a Mesh or a list of Mesh (see load_mesh)")
+
+
+def _drawable(mesh: Mesh) -> Mesh:
+    """The mesh, without textures if it has no texture coordinates: put together with others, it would get some."""
+    if mesh.uv is not None or all(material.texture is None for material in mesh.materials):
+        return mesh
+    warnings.warn(
+        f"mesh {mesh.name!r} has a texture, but no texture coordinates (uv): it is drawn without the texture",
+        stacklevel=4,
+    )
+    return replace(mesh, materials=tuple(replace(material, texture=None) for material in mesh.materials))
 
 
 def _several(value, kind, name: str, allowed: str) -> tuple:
