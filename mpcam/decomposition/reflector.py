@@ -8,15 +8,14 @@ from scipy.spatial import KDTree
 
 from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
+from mpcam.decomposition.welding import area_normals, has_area, place_numbers, usable_normals, welded
+from mpcam.decomposition.winding import first_of_each, reversed_faces
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
 FINE = 40_000
 """Triangles of the mesh that stands for an analytic surface where rays are traced; points are put on it exactly."""
-_CLOSE = 1e-9
-"""Vertices nearer than this part of the reflector's size are one."""
-_ALIKE = float(np.cos(np.radians(1.0)))
 _CHUNK = 1 << 21
 
 
@@ -51,19 +50,25 @@ class Reflector:
                 raise InputError(
                     f"the reflector has {len(corners)} triangles and none with finite corners: give others"
                 )
-            low, high = corners[finite].min(axis=(0, 1)), corners[finite].max(axis=(0, 1))
-            self.center = 0.5 * low + 0.5 * high
-            self.radius = float(np.linalg.norm(corners[finite] - self.center, axis=-1).max())
-            a, b = (corners[:, i] - corners[:, 0] for i in (1, 2))
-            doubled = np.linalg.norm(np.cross(a / (self.radius or 1.0), b / (self.radius or 1.0)), axis=1)
-        self.usable = finite & (doubled > 1e-18)
+            self.usable = finite & has_area(corners)
         if not self.usable.any():
             raise InputError("the reflector has no triangle with an area: give a mesh with one at least")
-        self.areas = np.where(self.usable, 0.5 * doubled, 0.0) * self.radius**2
-        normals = mesh.normals if mesh.normals is None else _usable_normals(mesh)
-        self.vertices, self.normals, self.faces = _welded(mesh, normals, self.usable, self.radius)
-        with np.errstate(invalid="ignore", over="ignore"):
-            self.face_normals = mesh.face_normals
+        # Of faces with an area alone: others may be anywhere.
+        low, high = (end(corners[self.usable], axis=(0, 1)) for end in (np.min, np.max))
+        self.center = 0.5 * low + 0.5 * high
+        self.radius = float(np.linalg.norm(corners[self.usable] - self.center, axis=-1).max())
+        places = np.where(np.isfinite(mesh.vertices), mesh.vertices, 0.0)
+        group = place_numbers(places, self.usable, mesh.faces, self.radius)
+        self.usable &= first_of_each(group[mesh.faces])
+        across = np.where(self.usable[:, None], area_normals(corners, self.radius), 0.0)
+        areas = 0.5 * np.linalg.norm(across, axis=1)
+        self.areas = areas * self.radius**2
+        around = reversed_faces(group[mesh.faces], areas, self.usable)
+        faces = np.where(around[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces)
+        across = np.where(around[:, None], -across, across)
+        normals = None if mesh.normals is None else usable_normals(mesh, faces, across)
+        self.vertices, self.normals, self.faces = welded(places, group, faces, normals, self.usable)
+        self.face_normals = Mesh(self.vertices, self.faces).face_normals
 
     def at(
         self, face: np.ndarray, second: np.ndarray, third: np.ndarray, along: np.ndarray | None = None
@@ -224,44 +229,6 @@ def pixel_hits(camera: Camera, reflector: Reflector) -> FirstHits:
     valid = np.asarray(ray.valid)
     found = reflector.first_hits(ray.origin, np.where(valid[:, None], ray.direction, (0.0, 0.0, 1.0)))
     return found._replace(hit=found.hit & valid, distance=np.where(valid, found.distance, np.inf))
-
-
-def _usable_normals(mesh: Mesh) -> np.ndarray:
-    """The mesh's unit normals, with smooth ones in place of those that are zero or not finite."""
-    assert mesh.normals is not None
-    with np.errstate(invalid="ignore"):
-        length = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
-        bad = ~(np.isfinite(length) & (length > 1e-12))
-    return np.where(bad, mesh.smooth_normals(), mesh.normals / np.where(bad, 1.0, length))
-
-
-def _welded(
-    mesh: Mesh, normals: np.ndarray | None, usable: np.ndarray, size: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, normals and faces with one vertex where positions, and normals to a degree, are the same."""
-    places = np.where(np.isfinite(mesh.vertices), mesh.vertices, 0.0)
-    _, group = np.unique(np.rint(places / (_CLOSE * (size or 1.0))), axis=0, return_inverse=True)
-    group = group.ravel()
-    faces = mesh.faces
-    if normals is None:
-        merged = np.zeros((group.max() + 1, 3))
-        merged[group] = places
-        return merged, Mesh(merged, group[faces][usable]).smooth_normals(), group[faces].astype(np.int32)
-    number, left, count = np.full(len(group), -1), np.arange(len(group)), 0
-    while len(left):
-        # The first vertex of each place, with all there that have its normal.
-        groups, first = np.unique(group[left], return_index=True)
-        leader = np.zeros(group.max() + 1, np.int64)
-        leader[groups] = left[first]
-        lead = leader[group[left]]
-        same = ((normals[left] * normals[lead]).sum(axis=1) >= _ALIKE) | (left == lead)
-        order = np.zeros(group.max() + 1, np.int64)
-        order[groups] = np.arange(count, count + len(groups))
-        number[left[same]] = order[group[left[same]]]
-        left, count = left[~same], count + len(groups)
-    vertices, joined = np.zeros((count, 3)), np.zeros((count, 3))
-    vertices[number], joined[number] = places, normals
-    return vertices, joined, number[faces].astype(np.int32)
 
 
 def _nearest_in(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
