@@ -95,7 +95,9 @@ def mirror_rows(
     for label, found in still.items():
         rows[label] = replace(rows[label], still_ms=1e3 * found.median, still_spread=1e3 * found.spread)
     if moving is not None:
-        calls = {label: moving_frame(picture, moving, scene.mesh.normals) for label, picture in pictures.items()}
+        calls = {
+            label: moving_frame(picture, moving, normals=scene.mesh.normals) for label, picture in pictures.items()
+        }
         for label, found in timing.measure(calls, repeats, warmup, on_call=steps.done).items():
             rows[label] = replace(rows[label], moving_ms=1e3 * found.median, moving_spread=1e3 * found.spread)
     return list(rows.values()), images, truth

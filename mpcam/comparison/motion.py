@@ -21,16 +21,14 @@ def moving_vertices(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
         return vertices, vertices + swing
 
 
-def moving_frame(
-    prepared: Any, positions: Sequence[np.ndarray], normals: np.ndarray | None = None
-) -> Callable[[], object]:
-    """A frame that starts with new vertices: each call takes the next of `positions`. normals: if it is shaded."""
+def moving_frame(prepared: Any, positions: Sequence[np.ndarray], **given: Any) -> Callable[[], object]:
+    """A frame that starts with new vertices: each call takes the next of `positions`. given: to `update`, besides."""
     count = 0
 
     def frame() -> object:
         nonlocal count
         count += 1
-        prepared.update(positions[count % len(positions)], normals=normals)
+        prepared.update(positions[count % len(positions)], **given)
         return prepared.frame()
 
     return frame

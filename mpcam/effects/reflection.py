@@ -109,13 +109,27 @@ class Reflection:
         return ByTracing(camera, mesh, self.rays.ray, self.shaded)
 
     @exclusive
-    def update(self, vertices: Any = None, *, normals: Any = None, transform: Any = None) -> None:
+    def update(
+        self,
+        vertices: Any = None,
+        *,
+        normals: Any = None,
+        transform: Any = None,
+        shadows: Sequence[Any] | None = None,
+    ) -> None:
         """The scene elsewhere: positions (V, 3) of all its vertices or a list with one array for each of its meshes,
-        or a rigid transform; see `Moving.update`. The mirror and its camera triangles stay. Raises InputError for other
-        shapes, where shading needs normals that are not known, and where there are shadows, which would stay behind.
+        or a rigid transform; see `Moving.update`. The mirror and its camera triangles stay. shadows: the shadow maps as
+        they are now, of a picture with shadows; they do not move by themselves. Raises InputError for other shapes,
+        where shading needs normals that are not known, and for shadows that are missing or none of this picture.
         """
-        if self.shadows:
-            raise InputError("shadow maps do not move with the scene: make a Reflection anew, with new maps")
+        if shadows is None and self.shadows:
+            raise InputError(
+                "this picture has shadow maps, which do not move with the scene: pass shadows=, the maps as they are "
+                "now (see mpcam.shadow_map), or the same ones where they are to stay"
+            )
+        if shadows is not None:
+            check_shadows(shadows, self.scene, self.shading)
+            self.shadows = shadows
         mesh = moved(self.scene.mesh, vertices, normals, transform)
         if self.shading in ("light", "normal"):
             vertex_normals(mesh)

@@ -162,7 +162,10 @@ def _time(shown: list[MirrorPicture], scene: Scene, count: int, steps: StepCount
     mirror = shown[0].row["mirror"]
     still = timing.measure(calls, count, WARMUP, on_call=lambda _: steps.done(f"{mirror}, still"))
     positions = moving_vertices(scene.mesh)
-    calls = {f"{i} moving": moving_frame(one.picture, positions, scene.mesh.normals) for i, one in enumerate(shown)}
+    calls = {
+        f"{i} moving": moving_frame(one.picture, positions, normals=scene.mesh.normals, shadows=one.picture.shadows)
+        for i, one in enumerate(shown)
+    }
     moving = timing.measure(calls, count, WARMUP, on_call=lambda _: steps.done(f"{mirror}, moving"))
     for i, one in enumerate(shown):
         one.row["still_ms"], one.row["moving_ms"] = 1e3 * still[f"{i} still"].median, 1e3 * moving[f"{i} moving"].median
