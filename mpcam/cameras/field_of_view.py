@@ -4,7 +4,7 @@ import dataclasses
 from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.calibrated import Calibrated
+from mpcam.cameras.calibrated import Calibrated, described
 from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.math import PI, Array, atan2, cos, minimum, sin, tan
 
@@ -68,6 +68,9 @@ class FieldOfView(Calibrated, Camera):
     def largest_angle(self) -> Array:
         """90 degrees."""
         return 0.5 * PI + 0.0 * self.omega
+
+    def __repr__(self) -> str:
+        return described(self, ("fx", "fy", "cx", "cy", "omega"), 0.5 * PI)
 
     def _stretch(self) -> Array:
         return 2.0 * tan(0.5 * self.omega)

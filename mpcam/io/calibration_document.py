@@ -39,10 +39,13 @@ class Document:
         except ValueError as error:  # a zero byte in the name
             raise InputError(f"{str(path)!r}: cannot be read: {error}") from None
 
-    @property
+    @functools.cached_property
     def binary(self) -> bool:
         """Whether it is no text."""
-        return b"\0" in self.data[:4096] and self.data[:2] not in _UTF16
+        try:
+            return "\0" in self.text
+        except InputError:
+            return True
 
     @functools.cached_property
     def text(self) -> str:

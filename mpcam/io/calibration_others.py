@@ -41,6 +41,14 @@ _TEXTS = (
         "export COLMAP's text, or OpenCV's calibration, from there",
     ),
 )
+_SUFFIXES = {
+    **dict.fromkeys(
+        (".obj", ".ply", ".stl", ".gltf", ".glb", ".off"), ("a mesh", "give a camera's file, and the mesh as SCENE")
+    ),
+    ".toml": ("a scene file", "give it as SCENE; its camera is used where no other is given"),
+    ".db": ("a database, as COLMAP's database.db", "export the model: colmap model_converter, or sparse/0"),
+    ".bag": ("a ROS bag", "write a message of it: rostopic echo -n 1 /camera_info > camera_info.yaml"),
+}
 _KEYS = (
     ({"calibration"}, "Agisoft Metashape's calibration", "export it there as OpenCV's XML (Tools, Camera Calibration)"),
     ({"document"}, "Agisoft Metashape's cameras", "export the calibration as OpenCV's XML, or COLMAP's model"),
@@ -59,6 +67,10 @@ _KEYS = (
 
 def named(document: Document) -> str | None:
     """What a file is and what to do, as the end of a sentence; None where it is not known."""
+    suffix = document.path.suffix.lower()
+    if suffix in _SUFFIXES and not document.folder:
+        what, advice = _SUFFIXES[suffix]
+        return f"is {what}: {advice}"
     if document.folder:
         return f"is a folder without a COLMAP model: {_COLMAP}"
     for start, what, advice in _BYTES:

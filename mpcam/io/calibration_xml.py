@@ -12,7 +12,7 @@ def read_xml(text: str, name: str) -> dict[str, Any]:
     name: the file's, for messages. Raises InputError, with the line, for a text that is no XML.
     """
     try:
-        root = ElementTree.fromstring(text.encode("utf-8") if "encoding" not in text[:80] else text.encode())
+        root = ElementTree.fromstring(text.encode())
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         line = getattr(error, "position", (None,))[0]
         raise InputError(f"{name}{'' if line is None else f':{line}'}: not XML: {error}") from None
@@ -33,9 +33,10 @@ def _value(element: ElementTree.Element) -> Any:
     found: dict[str, Any] = {}
     for child in children:
         found[child.tag] = _value(child)
-    if "data" in found:
-        data = found["data"]
-        found["data"] = data if isinstance(data, list) else ([data] if data else [])
+    if "data" in found:  # a matrix, whose lists may have one number or none
+        for key in {"data", "sizes"} & found.keys():
+            value = found[key]
+            found[key] = value if isinstance(value, list) else ([value] if value else [])
     return found
 
 

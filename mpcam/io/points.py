@@ -1,5 +1,6 @@
 """Points in text: a row each, as spreadsheets, NumPy and most tools write them."""
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mpcam.errors import InputError
+
+_BEGINS = re.compile(r"[-+]?[.,]?\d")  # how numbers begin, also those that are none, such as 1,5 or 1_000
 
 
 def read_points(source: str | Path) -> np.ndarray:
@@ -48,7 +51,7 @@ def parse_points(lines: Iterable[str], name: str) -> np.ndarray:
             continue
         cells = _cells(text)
         numbers = [_number(cell) for cell in cells]
-        if header and all(value is None for value in numbers) and any(cells):
+        if header and any(cells) and not any(map(_BEGINS.match, cells)) and all(value is None for value in numbers):
             header = False
             continue
         header = False

@@ -32,9 +32,9 @@ def viewed(
 
     eye, target (3,): scene units; without a target the camera looks at the middle of the meshes. up (3,): direction
     towards the top of the image; default: the scene's axis. size: width and height; the camera is resized to it, and
-    has it where its file says none. Without an eye, a camera has the pose of its file, and one whose file has none in the
-    world, such as a lens of a calibration, is put where it sees all meshes. Raises InputError for files and names that
-    do not lead to a camera, and for poses that are incomplete.
+    has it where its file says none. Without an eye, a camera has the pose of its file, and one whose file has none in
+    the world, such as a lens of a calibration, is put where it sees all meshes. Raises InputError for files and names
+    that do not lead to a camera, and for poses that are incomplete.
     """
     scene = loaded.scene
     if camera is not None:
