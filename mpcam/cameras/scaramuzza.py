@@ -5,7 +5,7 @@ import functools
 from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.calibrated import FARTHEST, Calibrated
+from mpcam.cameras.calibrated import Calibrated
 from mpcam.cameras.coefficients import coefficients_of
 from mpcam.cameras.fields import Number, Positive
 from mpcam.math import (
@@ -25,9 +25,13 @@ from mpcam.math import (
 )
 from mpcam.math.roots import bracketed_newton
 
+LEAST = 5e-3
+"""Radians per focal length at which the domain ends."""
+
 _MOST = 12
-_STEPS = 12  # of Newton, from an answer that is near
+_STEPS = 20  # of Newton, from an answer that is near
 _LARGEST = 1e6  # of a coefficient; views have less than 1
+_WIDEST = 1e3  # focal lengths, where no angle increases as fast as LEAST
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -39,7 +43,8 @@ class Scaramuzza(Calibrated, Camera):
 
     width, height: pixels. fx, fy, cx, cy: focal lengths and principal point, pixels, center of the top left pixel at
     (0.5, 0.5). a: a2, a3, ..., at most 12. camera_from_world: 4x4, OpenCV axes. max_angle: largest angle between a ray
-    and the axis, radians. The domain ends there, or where the angle stops increasing with r, whichever comes first.
+    and the axis, radians. The domain ends there, or where a focal length has less than 1 / 200 radian, whichever comes
+    first: short of where the angle turns back, where a direction has no certain pixel.
 
     Raises InputError for sizes below 1, focal lengths that are not positive, too many coefficients, numbers that are
     not finite, an angle outside (0, pi], and poses that are not rigid.
@@ -91,7 +96,7 @@ class Scaramuzza(Calibrated, Camera):
         root = safe_sqrt(ahead * ahead - 4.0 * bend * side * side)
         below = ahead + root
         start = where(below > 0, minimum(2.0 * side / where(below > 0, below, 1.0), farthest), farthest)
-        low, high = detach(0.0 * start), detach(0.0 * start + farthest)
+        low, high = detach(0.0 * start), detach(0.0 * start + 1.0001 * farthest)  # a root at an end is hard to reach
         r = bracketed_newton(
             lambda r: detach(beyond(r)), lambda r: detach(slope(r)), low, high, detach(start), _STEPS, high
         )
@@ -110,7 +115,7 @@ class Scaramuzza(Calibrated, Camera):
         return minimum(self._angle(minimum(r, self._farthest())), self.angle_limit())
 
     def largest_angle(self) -> Array:
-        """Where the angle stops increasing with r, or r is FARTHEST."""
+        """Where the angle hardly increases with r any more."""
         return self._angle(self._farthest() + (0.0 * sum(self.a) if self.a else 0.0))
 
     def _angle(self, r: Array) -> Array:
@@ -125,17 +130,16 @@ class Scaramuzza(Calibrated, Camera):
         return polynomial(_turning(self.a), r) / (r * r + ahead * ahead)
 
     def _farthest(self) -> Array:
-        """The first r at which the angle turns back, FARTHEST if there is none before; the rim once that is known."""
+        """The r at which the domain ends: the rim, once that is known."""
         if self.rim is not None:
             return self.rim
         kind = library(*self.a) if self.a else "numpy"
         if kind == "jax":
-            turning = _turning(tuple(detach(a) for a in self.a))
+            rising = _rising(tuple(detach(a) for a in self.a))
             # Equal steps of r / (1 + r) are fine where r is small.
-            end = FARTHEST / (1.0 + FARTHEST)
-            share = first_true(lambda share: polynomial(turning, share / (1.0 - share)) <= 0, end)
+            share = first_true(lambda share: polynomial(rising, share / (1.0 - share)) <= 0, 1.0 - 1e-9)
             return share / (1.0 - share)
-        return _turn(tuple(float(a if kind == "numpy" else detach(a)[0]) for a in self.a))
+        return _end(tuple(float(a if kind == "numpy" else detach(a)[0]) for a in self.a))
 
 
 def _derivative(a: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -148,7 +152,19 @@ def _turning(a: tuple[Array, ...]) -> tuple[Array, ...]:
     return (1.0, 0.0, *(-(power + 1) * value for power, value in enumerate(a)))
 
 
+def _rising(a: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Coefficients of P - r P' - LEAST (r^2 + P^2), which is above 0 as long as the angle's slope is above LEAST."""
+    ahead = (1.0, 0.0, *a)
+    found: list[Any] = [0.0] * max(2 * len(ahead) - 1, 3)
+    for i, value in enumerate(_turning(a)):
+        found[i] = found[i] + value
+    for i, first in enumerate(ahead):
+        for j, second in enumerate(ahead):
+            found[i + j] = found[i + j] - LEAST * first * second
+    found[2] = found[2] - LEAST
+    return tuple(found)
+
+
 @functools.lru_cache(maxsize=256)
-def _turn(a: tuple[float, ...]) -> float:
-    found = sign_changes(_turning(a), 0.0, FARTHEST)
-    return found[0] if found else FARTHEST
+def _end(a: tuple[float, ...]) -> float:
+    return sign_changes(_rising(a), 0.0, _WIDEST)[0]

@@ -3,10 +3,7 @@
 import functools
 from typing import Any
 
-import numpy as np
-
-from mpcam.cameras.calibrated import FARTHEST
-from mpcam.cameras.scaramuzza import Scaramuzza
+from mpcam.cameras.scaramuzza import LEAST, Scaramuzza
 from mpcam.stress.distant import SIZE as VIEW
 from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.exact import Real, parameters
@@ -33,28 +30,6 @@ def cameras() -> dict[str, Scaramuzza]:
     }
 
 
-def smallest_root(powers: list[Real], most: float) -> Real | None:
-    """The smallest positive root of a polynomial, lowest power first, by Newton's steps from that in float64.
-
-    None where there is none up to `most`; two that meet count as one.
-    """
-    import mpmath
-
-    roots = np.roots([float(x) for x in reversed(powers)])
-    near = [r.real for r in roots if abs(r.imag) < 1e-5 * abs(r) and 0 < r.real < 1.001 * most]
-    if not near:
-        return None
-    r = mpmath.mpf(min(near))
-    for _ in range(300):
-        value, slope = mpmath.polyval(powers[::-1], r, derivative=True)
-        if slope == 0:
-            break
-        r, before = r - value / slope, r
-        if abs(r - before) <= abs(r) * mpmath.mpf(10) ** -75:
-            break
-    return r
-
-
 def definition(camera: Scaramuzza) -> Definition:
     """Scaramuzza et al. 2006, equation 11: the smallest r along a direction."""
     import mpmath
@@ -62,15 +37,24 @@ def definition(camera: Scaramuzza) -> Definition:
     def ahead(r: Real, a: tuple[Real, ...]) -> Real:
         return 1 + sum(x * r ** (i + 2) for i, x in enumerate(a))
 
+    def slope(r: Real, a: tuple[Real, ...]) -> Real:
+        return sum((i + 2) * x * r ** (i + 1) for i, x in enumerate(a))
+
     @functools.lru_cache(maxsize=64)
     def end(a: tuple[Real, ...]) -> tuple[Real, Real]:
-        """Where the angle turns back: r and the angle."""
-        found = smallest_root([mpmath.mpf(1), mpmath.mpf(0), *(-(i + 1) * x for i, x in enumerate(a))], FARTHEST)
-        r = mpmath.mpf(FARTHEST) if found is None else found
+        """The first r at which the angle's derivative is LEAST, and the angle there: by samples, then by halving."""
+
+        def excess(r: Real) -> Real:
+            p = ahead(r, a)
+            return (p - r * slope(r, a)) / (r * r + p * p) - mpmath.mpf(LEAST)
+
+        step = mpmath.mpf(1) / 500
+        low = next(i * step for i in range(500_000) if excess((i + 1) * step) <= 0)
+        r = mpmath.findroot(excess, (low, low + step), solver="anderson", tol=mpmath.mpf(10) ** -140, verify=False)
         return r, mpmath.atan2(r, ahead(r, a))
 
     def radius(rho: Real, z: Real, *a: Real) -> Real:
-        """The smallest positive root of r z = rho P(r)."""
+        """The smallest positive root of r z = rho P(r): Newton's steps, or halves of the bracket that they leave."""
         if rho == 0 and z > 0:
             return mpmath.mpf(0)
         farthest, turn = end(a)
@@ -78,8 +62,19 @@ def definition(camera: Scaramuzza) -> Definition:
             return farthest
         length = mpmath.hypot(rho, z)
         side, front = rho / length, z / length
-        found = smallest_root([side, -front, *(side * x for x in a)], float(farthest))
-        return farthest if found is None else found
+        low, high = mpmath.mpf(0), farthest
+        r = min(side / front, high / 2) if front > 0 else high / 2
+        for _ in range(600):
+            value = r * front - side * ahead(r, a)
+            low, high = (r, high) if value <= 0 else (low, r)
+            rate = front - side * slope(r, a)
+            after = r - value / rate if rate > 0 else low
+            after = after if low < after < high else (low + high) / 2
+            done = abs(after - r) <= abs(r) * mpmath.mpf(10) ** -75
+            r = after
+            if done:
+                break
+        return r
 
     def largest(*a: Real) -> Real:
         return min(mpmath.mpf(camera.max_angle), end(a)[1])
