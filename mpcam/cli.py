@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 import mpcam
-from mpcam.cli_common import check_machine, image_size, load, print_json
+from mpcam.cli_common import View, check_machine, image_size, load, print_json, say_warnings
 from mpcam.cli_mirrors import caustics, decompose, surround
 from mpcam.errors import InputError, SetupError
 from mpcam_kernels.backend import BackendError
@@ -39,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     form, warnings.formatwarning = warnings.formatwarning, _one_line
     try:
-        status = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with say_warnings():
+            status = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except (InputError, CycloptsError) as error:
         return _complain(error, EXIT_INPUT)
@@ -65,6 +66,7 @@ def compare(
     methods: str | None = None,
     repeats: int | None = None,
     size: str | None = None,
+    view: View | None = None,
     json: bool = False,
     quiet: bool = False,
 ) -> None:
@@ -89,6 +91,8 @@ def compare(
 
     if demo == (scene is not None):
         raise InputError("compare needs one thing to compare: give a scene or --demo")
+    if demo and view not in (None, View()):
+        raise InputError("--camera, --eye, --target and --up do not go with --demo: give a scene")
     if demo and methods:
         raise InputError("--methods does not go with --demo, which compares all: give a scene")
     console = Console(quiet=quiet or json, width=None if sys.stdout.isatty() else WIDTH)
@@ -102,7 +106,7 @@ def compare(
         if json:
             print_json([result.to_dict() for result in results])
         return
-    loaded = load(str(scene), size)
+    loaded = load(str(scene), size, view)
     asked = loaded.compare
     names = asked.methods if methods is None else tuple(name.strip() for name in methods.split(","))
     options: dict[str, Any] = {"shading": asked.shading, "repeats": asked.repeats if repeats is None else repeats}
@@ -132,6 +136,7 @@ def render(
     output: Path,
     method: str = "invert",
     size: str | None = None,
+    view: View | None = None,
     projection: str | None = None,
     shading: str = "light",
     shadows: bool = False,
@@ -177,7 +182,7 @@ def render(
     if shadow_size is not None and not shadows:
         raise InputError(f"--shadow-size {shadow_size} goes with --shadows: give that too")
     check_machine()
-    loaded = load(scene, size).scene
+    loaded = load(scene, size, view).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
     asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull, "triangles": triangles}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
@@ -210,18 +215,36 @@ for command in (decompose, caustics, surround):
 
 
 @app.command
-def project(scene: str, points: Annotated[str, Parameter(allow_leading_hyphen=True)], /, *, json: bool = False) -> None:
+def project(
+    scene: str,
+    points: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    /,
+    *,
+    view: View | None = None,
+    size: str | None = None,
+    json: bool = False,
+) -> None:
     """Project points into the image: a row each with the number of the point, pixel (u right, v down), depth, valid.
 
     Args:
-        scene: Camera as a JSON file or in the header of an EXR image, or a scene whose camera is taken.
+        scene: FILE or FILE:NAME with a camera, as --camera takes it, or a scene whose camera is taken. With --camera it
+            may be left out.
         points: Text file with rows of x, y, z in world coordinates; - for standard input.
+        size: Image size in pixels, as 640x480 or 512, for files that do not say it; others are resized.
         json: Print JSON: for each point the list of its images, null where it has none.
     """
     from mpcam.io.cameras import load_camera
     from mpcam.io.points import read_points
+    from mpcam.io.scene_view import placed_at
 
-    found = load_camera(scene).project(read_points(points))
+    view, pixels = view or View(), None if size is None else image_size(size)
+    if points is None and view.camera is None:
+        raise InputError(f"project {scene}: POINTS are missing: give a camera or a scene, and a file of points")
+    if points is None or view.camera is None:
+        camera = placed_at(load_camera(view.camera or scene, size=pixels), **view.points())
+    else:
+        camera = load(scene, size, view).scene.camera
+    found = camera.project(read_points(scene if points is None else points))
     rows = [
         [(*map(float, pixel), float(depth)) if valid else None for pixel, depth, valid in zip(*images, strict=True)]
         for images in zip(found.pixel, found.depth, found.valid, strict=True)

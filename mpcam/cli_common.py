@@ -2,8 +2,14 @@
 
 import json
 import re
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from mpcam.errors import InputError
 
@@ -11,14 +17,60 @@ if TYPE_CHECKING:
     from mpcam.io.scenes import SceneFile
 
 
-def load(name: str, size: str | None) -> "SceneFile":
-    from mpcam.cameras.change import resized
+_Point = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class View:
+    """Who looks, in place of the scene's own camera.
+
+    Args:
+        camera: FILE or FILE:NAME with a camera: a calibration (Kalibr, OpenCV, ROS, COLMAP and others), a camera as
+            JSON, or an EXR image that mpcam wrote.
+        eye: Point x,y,z to look from; if not given, where the file says, else where all meshes are seen.
+        target: Point x,y,z to look at; the middle of the meshes if not given.
+        up: Direction x,y,z towards the top of the image.
+    """
+
+    camera: str | None = None
+    eye: _Point = None
+    target: _Point = None
+    up: _Point = None
+
+    def points(self) -> dict[str, Any]:
+        """eye, target and up as arrays, or None."""
+        from mpcam.io.points import read_point
+
+        given = {"eye": self.eye, "target": self.target, "up": self.up}
+        return {name: None if text is None else read_point(text, f"--{name}") for name, text in given.items()}
+
+
+def load(name: str, size: str | None, view: View | None = None) -> "SceneFile":
+    from mpcam.io.scene_view import viewed
     from mpcam.io.scenes import load_scene
 
+    view = view or View()
+    points, pixels = view.points(), None if size is None else image_size(size)
     loaded = load_scene(name)
-    if size is None:
+    if view == View() and pixels is None:
         return loaded
-    return replace(loaded, scene=replace(loaded.scene, camera=resized(loaded.scene.camera, *image_size(size))))
+    return viewed(loaded, view.camera, **points, size=pixels)
+
+
+@contextmanager
+def say_warnings() -> Iterator[None]:
+    """Within it, a warning about what was given is one line, as mistakes are."""
+
+    def say(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if issubclass(category, UserWarning):
+            print("mpcam: warning:", " ".join(str(message).split()), file=sys.stderr)
+        else:
+            usual(message, category, *rest)
+
+    with warnings.catch_warnings():
+        usual, warnings.showwarning = warnings.showwarning, say
+        yield
 
 
 def image_size(text: str) -> tuple[int, int]:

@@ -17,7 +17,16 @@ from mpcam.stress.projections import image_rows, images, judge_images, judge_ray
 from mpcam.stress.regions import OUTLINE, bound_rows
 from mpcam.stress.report import LIMIT, StressRow, as_dicts, joined, kind_of, run_cases
 
-CURVED, STRAIGHT = ("radial", "kannala-brandt", "double-sphere", "unified-omni"), ("pinhole", "orthographic")
+CURVED = (
+    "radial",
+    "kannala-brandt",
+    "double-sphere",
+    "unified-omni",
+    "angle-polynomial",
+    "scaramuzza",
+    "field-of-view",
+)
+STRAIGHT = ("pinhole", "orthographic")
 
 
 def cases(names) -> list[tuple[str, str]]:

@@ -6,11 +6,11 @@ from typing import Annotated, Any, ClassVar, Self
 from mpcam.cameras import folds
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import FARTHEST, described
+from mpcam.cameras.coefficients import coefficients_of
 from mpcam.cameras.distortion import Distortion, Reach
 from mpcam.cameras.fields import Limits, Number, Positive
 from mpcam.cameras.symmetric import finite_pixel, project_centered
 from mpcam.cameras.types import Domain, Projection, Ray, RayGeometry
-from mpcam.errors import InputError
 from mpcam.math import PI, Array, Vector, absolute, atan, epsilon, library, maximum, normalize, safe_sqrt, vector, where
 
 _LARGEST = 1e30  # of a coefficient; those of telephoto lenses grow with the power of the focal length
@@ -57,7 +57,8 @@ class BrownConrady(Camera):
         self._check_frame()
         self._check_numbers()
         for name, count in (("k", 6), ("p", 2)):
-            object.__setattr__(self, name, _coefficients(name, getattr(self, name), count))
+            given = coefficients_of("BrownConrady", name, getattr(self, name), count, _LARGEST)
+            object.__setattr__(self, name, given + (0.0,) * (count - len(given)))
         numbers = (self.fx, self.fy, self.cx, self.cy, self.max_angle, *self.k, *self.p)
         found = folds.reach(self.distortion, self.max_angle) if library(*numbers) == "numpy" else None
         object.__setattr__(self, "reach", found)
@@ -143,16 +144,3 @@ class BrownConrady(Camera):
 
     def __repr__(self) -> str:
         return described(self, ("fx", "fy", "cx", "cy", "k", "p"), 0.5 * PI)
-
-
-def _coefficients(name: str, values: Any, count: int) -> tuple[Array, ...]:
-    """Coefficients as a tuple of so many Python floats, or arrays of another library."""
-    try:
-        numbers = tuple(float(value) if library(value) == "numpy" else value for value in values)
-    except (TypeError, ValueError):
-        numbers = None
-    if numbers is None or len(numbers) > count:
-        raise InputError(f"BrownConrady({name}={values!r}): at most {count} numbers are needed")
-    if not all(library(number) != "numpy" or abs(number) <= _LARGEST for number in numbers):
-        raise InputError(f"BrownConrady({name}={values!r}): numbers between {-_LARGEST:g} and {_LARGEST:g} are needed")
-    return numbers + (0.0,) * (count - len(numbers))

@@ -208,5 +208,5 @@ def described(camera: Any, names: tuple[str, ...], widest: float) -> str:
 
 def _short(value: Any) -> str:
     if isinstance(value, tuple):
-        return f"({', '.join(map(_short, value))})"
+        return f"({', '.join(map(_short, value))}{',' if len(value) == 1 else ''})"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

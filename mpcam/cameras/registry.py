@@ -16,6 +16,9 @@ from mpcam.cameras.kannala_brandt import KannalaBrandt as KannalaBrandt
 from mpcam.cameras.double_sphere import DoubleSphere as DoubleSphere
 from mpcam.cameras.unified_omni import UnifiedOmni as UnifiedOmni
 from mpcam.cameras.brown_conrady import BrownConrady as BrownConrady
+from mpcam.cameras.angle_polynomial import AnglePolynomial as AnglePolynomial
+from mpcam.cameras.scaramuzza import Scaramuzza as Scaramuzza
+from mpcam.cameras.field_of_view import FieldOfView as FieldOfView
 from mpcam.cameras.panorama import Panorama as Panorama
 from mpcam.cameras.ray_map import RayMap as RayMap
 from mpcam.cameras.camera_triangles import CameraTriangles as CameraTriangles

@@ -7,50 +7,79 @@ import re
 
 import numpy as np
 
-from mpcam.cameras import BrownConrady, Camera, DoubleSphere, KannalaBrandt, Pinhole, UnifiedOmni
+from mpcam.cameras import BrownConrady, Camera, DoubleSphere, FieldOfView, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import (
-    HALF,
-    Section,
-    coefficients_held,
-    intrinsics,
-    inverse,
-    pinhole_or_fisheye,
-    undistorted,
-)
-from mpcam.io.calibration_yaml import read_yaml
+from mpcam.io.calibration_document import Document
+from mpcam.io.calibration_lenses import coefficients_held, field_of_view, pinhole_or_fisheye, undistorted
+from mpcam.io.calibration_parts import HALF, Section, intrinsics
+from mpcam.io.calibration_poses import Poses, inverse
 
 STYLE = "Kalibr's camchain"
+POSES = "rig"
 MODELS: dict[type[Camera], str] = {
     Pinhole: "pinhole",
     BrownConrady: "pinhole",
     KannalaBrandt: "pinhole",
+    FieldOfView: "pinhole",
     DoubleSphere: "ds",
     UnifiedOmni: "eucm",
 }
 _LEADING = {"pinhole": 0, "omni": 1, "ds": 2, "eucm": 2}  # numbers before fu, fv, pu, pv
 _DISTORTIONS = ("none", "radtan", "equidistant", "fov")
+_POSES = ("T_cn_cnm1", "T_cam_imu", "T_imu_cam")
 
 
-def recognizes(text: str) -> bool:
-    """Whether there is a key cam0 or the like."""
-    return re.search(r"^cam\d+\s*:", text, re.MULTILINE) is not None
+def recognizes(document: Document) -> bool:
+    """Whether there are keys cam0 or the like, and a camera model in each."""
+    found = [value for key, value in document.mapping().items() if re.fullmatch(r"cam\d+", str(key))]
+    return bool(found) and not any(isinstance(value, dict) and {"K", "camera_matrix"} & value.keys() for value in found)
 
 
-def read(text: str, name: str) -> dict[str, Camera]:
+def read(document: Document) -> dict[str, Camera]:
     """Cameras by the names of the file, with the pose of each relative to cam0."""
-    whole = Section(name, read_yaml(text, name))
+    whole = Section(document.where, document.tree, document.size)
     found = sorted(int(key[3:]) for key in whole.data if re.fullmatch(r"cam\d+", str(key)))
     if not found or found != list(range(len(found))):
         raise whole.error("cam0, cam1, ... are needed, without gaps")
-    cameras: dict[str, Camera] = {}
-    pose = np.eye(4)
-    for number in found:
-        part = Section(f"{name}: cam{number}", whole.data[f"cam{number}"])
-        if number:
-            pose = part.matrix("T_cn_cnm1") @ pose
-        cameras[f"cam{number}"] = part.camera(_camera(part).with_pose, pose)
-    return cameras
+    parts = [Section(f"{whole.where}: cam{number}", whole.data[f"cam{number}"], whole.given) for number in found]
+    lenses = [_camera(part) for part in parts]
+    poses = Poses()
+    placed = _placed(parts, poses)
+    poses.warn()
+    return {f"cam{n}": part.camera(lenses[n].with_pose, placed[n]) for n, part in enumerate(parts)}
+
+
+def _placed(parts: list[Section], poses: Poses) -> list[np.ndarray]:
+    """Pose of each camera from cam0: along the chain, or by the IMU where the chain is not given."""
+    imu = [_from_imu(part, poses) if len(parts) > 1 and _needs_imu(parts, n) else None for n, part in enumerate(parts)]
+    placed: list[np.ndarray | None] = [np.eye(4)]
+    for number, part in enumerate(parts[1:], 1):
+        first, own, before = imu[0], imu[number], placed[number - 1]
+        if "T_cn_cnm1" in part:
+            step = poses.read(part, "T_cn_cnm1")
+            placed.append(None if step is None or before is None else step @ before)
+            if step is not None and before is None:
+                poses.lose(f"{part.where}: T_cn_cnm1", f"is relative to cam{number - 1}, whose pose is not known")
+        elif own is not None and first is not None:
+            placed.append(own @ inverse(first))
+        else:
+            if not any(key in part for key in _POSES[1:]) or not any(key in parts[0] for key in _POSES[1:]):
+                poses.lose(f"{part.where}: T_cn_cnm1", "is missing, and so is T_cam_imu or T_imu_cam here or of cam0")
+            placed.append(None)
+    return [np.eye(4) if pose is None else pose for pose in placed]
+
+
+def _needs_imu(parts: list[Section], number: int) -> bool:
+    """Whether the pose of a camera relative to the IMU is used: of those without a chain, and of cam0 for them."""
+    missing = ["T_cn_cnm1" not in part for part in parts[1:]]
+    return any(missing) if number == 0 else missing[number - 1]
+
+
+def _from_imu(part: Section, poses: Poses) -> np.ndarray | None:
+    if "T_cam_imu" in part:
+        return poses.read(part, "T_cam_imu")
+    found = poses.read(part, "T_imu_cam") if "T_imu_cam" in part else None
+    return None if found is None else inverse(found)
 
 
 def _camera(part: Section) -> Camera:
@@ -61,17 +90,20 @@ def _camera(part: Section) -> Camera:
     if distortion not in _DISTORTIONS:
         raise part.error(f"distortion_model {distortion!r} is not known here: allowed are {', '.join(_DISTORTIONS)}")
     coefficients = part.numbers("distortion_coeffs", otherwise=[])
-    size = part.size(*part.numbers("resolution", 2))
+    size = part.image_size("resolution")
     numbers = part.numbers("intrinsics", 4 + _LEADING[model])
     shape, (fx, fy, cx, cy) = numbers[:-4], numbers[-4:]
     frame = [fx, fy, cx + HALF, cy + HALF]
     if model == "pinhole":
-        if distortion in ("none", "fov"):
+        if distortion == "fov":
+            (omega,) = part.numbers("distortion_coeffs", 1)
+            return field_of_view(part, size, frame, omega)
+        if distortion == "none":
             undistorted(part, coefficients, f"{distortion} distortion of {model}")
             coefficients = []
         return pinhole_or_fisheye(part, distortion == "equidistant", size, frame, coefficients)
-    if distortion == "equidistant":
-        raise part.error(f"no camera of mpcam has equidistant distortion on top of {model}")
+    if distortion in ("equidistant", "fov"):
+        raise part.error(f"no camera of mpcam has {distortion} distortion on top of {model}")
     undistorted(part, coefficients, f"{distortion} distortion of {model}")
     if model == "omni":
         return part.camera(UnifiedOmni.mei, *size, *frame, *shape)
@@ -93,6 +125,8 @@ def write(cameras: dict[str, Camera]) -> str:
             distortion, coefficients = "equidistant", camera.k
         elif isinstance(camera, BrownConrady):
             distortion, coefficients = "radtan", coefficients_held(camera, "k1 k2 p1 p2", STYLE)
+        elif isinstance(camera, FieldOfView):
+            distortion, coefficients = "fov", [camera.omega]
         elif isinstance(camera, DoubleSphere):
             shape = [camera.xi, camera.alpha]
         elif isinstance(camera, UnifiedOmni):

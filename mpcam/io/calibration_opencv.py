@@ -1,25 +1,24 @@
-"""OpenCV's YAML of one camera: camera_matrix, distortion_coefficients, and what says which model they belong to.
+"""OpenCV's calibrations, ROS's camera_info, and many files of their kind: a camera matrix and a list of coefficients.
 
-The names are those of OpenCV's calibration programs and of ROS; the center of the first pixel is at (0, 0) there.
+YAML, JSON, XML or .npz; the center of the first pixel is at (0, 0) there.
 """
 
 import json
+import warnings
 from typing import Any
+
+import numpy as np
 
 from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole, UnifiedOmni
 from mpcam.errors import InputError
-from mpcam.io.calibration_parts import (
-    HALF,
-    Section,
-    coefficients_held,
-    intrinsics,
-    pinhole_or_fisheye,
-    single,
-    undistorted,
-)
-from mpcam.io.calibration_yaml import read_yaml
+from mpcam.io.calibration_document import Document
+from mpcam.io.calibration_lenses import RADTAN, coefficients_held, pinhole_or_fisheye, undistorted
+from mpcam.io.calibration_matrices import DISTORTION, MATRIX, SIZES, camera_matrix, key_of, listed_frame, numbers_of
+from mpcam.io.calibration_parts import HALF, Section, intrinsics, single
+from mpcam.io.calibration_poses import Poses, rotated
 
 STYLE = "OpenCV's YAML"
+POSES = "rig"
 MODELS: dict[type[Camera], str] = {
     Pinhole: "pinhole",
     BrownConrady: "pinhole",
@@ -27,42 +26,107 @@ MODELS: dict[type[Camera], str] = {
     UnifiedOmni: "omnidir",
 }
 
-_FISHEYE = ("fisheye", "equidistant", "kannala_brandt", "kannalabrandt4")
-_PLAIN = ("plumb_bob", "rational_polynomial", "radtan", "none", "pinhole")
+_FISHEYE = ("fisheye", "equidistant", "kannala_brandt", "kannalabrandt4", "opencv_fisheye")
+_PLAIN = (
+    "plumb_bob",
+    "rational_polynomial",
+    "radtan",
+    "radial-tangential",
+    "brown_conrady",
+    "none",
+    "pinhole",
+    "opencv",
+)
+_MODEL_KEYS = ("distortion_model", "DistortionModel", "distortionModel", "camera_model", "model")
+_NAMED = {"fx", "fy"}
 _COEFFICIENTS = "k1 k2 p1 p2 k3 k4 k5 k6"  # the last three only where they are needed
 
 
-def recognizes(text: str) -> bool:
-    """Whether the text has OpenCV's matrices or its name for the camera matrix."""
-    return "!!opencv-matrix" in text or "\ncamera_matrix:" in f"\n{text}"
+def recognizes(document: Document) -> bool:
+    """Whether it has a camera matrix by one of its names, itself or in each of its parts, or one for each of two."""
+    data = document.mapping()
+    return bool(_parts({"": data}) or _parts(data) or key_of(data, MATRIX, "1"))
 
 
-def read(text: str, name: str) -> dict[str, Camera]:
-    """The camera, under the name that the file gives it, or "camera"."""
-    part = Section(name, read_yaml(text, name))
-    size = part.size(part.get("image_width"), part.get("image_height"))
-    matrix = _matrix(part, "camera_matrix", 9)
-    if any(matrix[i] != expected for i, expected in ((1, 0), (3, 0), (6, 0), (7, 0), (8, 1))):
-        raise part.error("camera_matrix has skew or is no camera matrix: fx 0 cx, 0 fy cy, 0 0 1 is needed")
-    frame = [matrix[0], matrix[4], matrix[2] + HALF, matrix[5] + HALF]
-    coefficients = _matrix(part, "distortion_coefficients") if "distortion_coefficients" in part else []
+def read(document: Document) -> dict[str, Camera]:
+    """The camera, under the name that the file gives it, or "camera"; of two cameras in one file, "1" and "2".
+
+    Cameras that are the parts of a file go by the parts' names.
+    """
+    part = Section(document.where, document.tree, document.size)
+    alone, inner = _parts({"": part.data}), _parts(part.data)
+    if not alone and key_of(part.data, MATRIX, "1") is not None:
+        return _stereo(part)
+    if not alone and inner:
+        shared = {key: value for key, value in part.data.items() if key not in inner}
+        return {
+            str(key): _camera(Section(f"{part.where}: {key}", shared | one, part.given)) for key, one in inner.items()
+        }
+    return {str(part.get("camera_name", "camera")): _camera(part)}
+
+
+def _parts(data: dict[Any, Any]) -> dict[Any, dict[Any, Any]]:
+    """Values of a mapping that are cameras: mappings with a matrix, or with its numbers by name."""
+    found = {key: value for key, value in data.items() if isinstance(value, dict)}
+    return {key: one for key, one in found.items() if key_of(one, MATRIX) or _NAMED <= one.keys()}
+
+
+def _camera(part: Section, suffix: str = "") -> Camera:
+    key = key_of(part.data, MATRIX, suffix) or f"camera_matrix{suffix}"
+    named = listed_frame(part) if key not in part else None
+    frame = camera_matrix(part, key) if named is None else named
+    size = part.image_size(*SIZES)
+    listed = key_of(part.data, DISTORTION, suffix)
+    if listed is None:
+        coefficients = _named_coefficients(part) if not suffix else []
+    else:
+        coefficients = numbers_of(part, listed)
+    _warn_of_regions(part)
     if "xi" in part:
         undistorted(part, coefficients, "the distortion beside xi")
-        camera = part.camera(UnifiedOmni.mei, *size, *frame, _xi(part))
-    else:
-        camera = pinhole_or_fisheye(part, _is_fisheye(part, coefficients), size, frame, coefficients)
-    return {str(part.get("camera_name", "camera")): camera}
+        (xi,) = numbers_of(part, "xi")
+        return part.camera(UnifiedOmni.mei, *size, *frame, xi)
+    return pinhole_or_fisheye(part, _is_fisheye(part, coefficients), size, frame, coefficients)
+
+
+def _named_coefficients(part: Section) -> list[float]:
+    """Coefficients with a key for each; those of a fisheye, which has no p1 and p2, are four."""
+    there = [name for name in RADTAN[:8] if name in part]
+    if "p1" not in there and "k4" in there:
+        return [part.number(name, 0.0) for name in ("k1", "k2", "k3", "k4")]
+    last = max((RADTAN.index(name) for name in there), default=-1)
+    count = next(length for length in (0, 4, 5, 8) if length > last)
+    return [part.number(name, 0.0) for name in RADTAN[:count]]
+
+
+def _stereo(part: Section) -> dict[str, Camera]:
+    """Two cameras, as OpenCV's stereo programs write them; world is the frame of the first."""
+    cameras = {number: _camera(part, number) for number in ("1", "2") if key_of(part.data, MATRIX, number)}
+    poses = Poses()
+    if "2" in cameras and "R" in part and "T" in part:
+        rotation, shift = numbers_of(part, "R"), numbers_of(part, "T")
+        if (len(rotation), len(shift)) == (9, 3):
+            pose = poses.rigid(f"{part.where}: R", rotated(np.reshape(rotation, (3, 3)), shift))
+            cameras["2"] = cameras["2"] if pose is None else cameras["2"].with_pose(pose)
+        else:
+            poses.lose(f"{part.where}: R and T", f"have {len(rotation)} and {len(shift)} numbers, not 9 and 3")
+    elif "2" in cameras:
+        poses.lose(f"{part.where}: R and T", "of the second camera are missing")
+    poses.warn()
+    return cameras
 
 
 def _is_fisheye(part: Section, coefficients: list[float]) -> bool:
-    if "fisheye_model" in part:
-        flag = part.get("fisheye_model")
-        return flag if isinstance(flag, bool) else part.number("fisheye_model") != 0
-    if "distortion_model" in part:
-        model = str(part.get("distortion_model")).lower()
+    for key in ("fisheye_model", "is_fisheye", "fisheye"):
+        if key in part:
+            flag = part.get(key)
+            return flag if isinstance(flag, bool) else part.number(key) != 0
+    named = next((key for key in _MODEL_KEYS if part.data.get(key)), None)
+    if named is not None:
+        model = str(part.get(named)).lower()
         if model not in (*_FISHEYE, *_PLAIN):
             allowed = ", ".join((*_FISHEYE, *_PLAIN))
-            raise part.error(f"distortion_model {model!r} is not known here: allowed are {allowed}")
+            raise part.error(f"{named} {model!r} is not known here: allowed are {allowed}")
         return model in _FISHEYE
     if any(coefficients) and len(coefficients) == 4:
         raise part.error(
@@ -71,22 +135,29 @@ def _is_fisheye(part: Section, coefficients: list[float]) -> bool:
     return False
 
 
-def _matrix(part: Section, key: str, count: int | None = None) -> list[float]:
-    """The numbers of a matrix, row by row."""
-    inner = Section(f"{part.where}: {key}", part.get(key))
-    numbers = inner.numbers("data", otherwise=[])
-    shape = [inner.number(side) for side in ("rows", "cols")]
-    if shape[0] * shape[1] != len(numbers) or (count is not None and len(numbers) != count):
-        wanted = f"{shape[0]:g} x {shape[1]:g}" if count is None else f"{count}"
-        raise inner.error(f"{len(numbers)} numbers are there, {wanted} are needed")
-    return numbers
-
-
-def _xi(part: Section) -> float:
-    if not isinstance(part.get("xi"), dict):
-        return part.number("xi")
-    (xi,) = _matrix(part, "xi", 1)
-    return xi
+def _warn_of_regions(part: Section) -> None:
+    """Say where the images of a ROS camera are not those that the lens is given for."""
+    roi = part.data.get("roi")
+    inner = roi if isinstance(roi, dict) else {}
+    moved = any(inner.get(key) not in (None, 0, 0.0) for key in ("x_offset", "y_offset", "width", "height"))
+    binned = [key for key in ("binning_x", "binning_y") if part.data.get(key) not in (None, 0, 1)]
+    for what in [*binned, *(["roi"] if moved else [])]:
+        warnings.warn(
+            f"{part.where}: {what} is not applied: the camera is that of the whole image",
+            UserWarning,
+            stacklevel=6,
+        )
+    rectified = part.data.get("R") or part.data.get("rectification_matrix")
+    if rectified and "T" not in part:
+        key = "R" if "R" in part else "rectification_matrix"
+        numbers = numbers_of(part, key)
+        if len(numbers) == 9 and np.abs(np.reshape(numbers, (3, 3)) - np.eye(3)).max() > 1e-9 and any(numbers):
+            warnings.warn(
+                f"{part.where}: {key} and the projection matrix belong to rectified images: the camera is that of the "
+                "images as they are taken",
+                UserWarning,
+                stacklevel=6,
+            )
 
 
 def write(cameras: dict[str, Camera]) -> str:

@@ -1,28 +1,28 @@
-"""What the calibration formats share: looking things up in a file with one-line complaints, and building cameras."""
+"""What the calibration formats share: looking things up in a file with one-line complaints, and the half pixel."""
 
 import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numpy as np
-
-from mpcam.cameras import BrownConrady, Camera, KannalaBrandt, Pinhole
+from mpcam.cameras import Camera
 from mpcam.errors import InputError
+from mpcam.io.calibration_yaml import Tagged
 
 T = TypeVar("T")
 
 HALF = 0.5
 """What OpenCV and Kalibr, with (0, 0) at the center of the first pixel, lack in their principal points."""
 
-RADTAN = tuple("k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y".split())
-"""OpenCV's coefficients in its order: radial and tangential, rational, thin prism, tilted sensor."""
+
+class NoSize(InputError):
+    """A file that says nothing of the size of its images, and a caller who does neither."""
 
 
 class Section:
-    """A mapping in a calibration file, and how to call it in messages: "cam.yaml: cam0"."""
+    """A mapping in a calibration file, how to call it in messages ("cam.yaml: cam0"), and the size given for it."""
 
-    def __init__(self, where: str, data: Any):
-        self.where = where
+    def __init__(self, where: str, data: Any, given: tuple[int, int] | None = None):
+        self.where, self.given = where, given
         if not isinstance(data, dict):
             raise InputError(f"{where}: a mapping of names to values is needed here, got {_kind(data)}")
         self.data: dict[Any, Any] = data
@@ -53,12 +53,30 @@ class Section:
             raise InputError(f"{where}: {len(value)} numbers are there, {allowed} are needed")
         return [as_number(item, where) for item in value]
 
-    def matrix(self, key: str) -> np.ndarray:
-        """A 4x4 matrix of numbers in nested lists."""
-        rows = self.get(key)
-        if not isinstance(rows, list) or len(rows) != 4 or not all(isinstance(r, list) and len(r) == 4 for r in rows):
-            raise self.error(f"{key}: four rows of four numbers are needed")
-        return np.array([[as_number(item, f"{self.where}: {key}") for item in row] for row in rows])
+    def part(self, key: str) -> "Section":
+        """The mapping that is the value of a key."""
+        return Section(f"{self.where}: {key}", self.get(key), self.given)
+
+    def image_size(self, *keys: str | tuple[str, str]) -> tuple[int, int]:
+        """Width and height: by the first key, or pair of keys, that is there; else what the caller gave.
+
+        Raises NoSize where neither is, and InputError where they differ.
+        """
+        for key in keys:
+            names = (key,) if isinstance(key, str) else key
+            if all(name in self for name in names):
+                found = self.size(*(self.numbers(names[0], 2) if len(names) == 1 else map(self.get, names)))
+                if self.given not in (None, found):
+                    raise self.error(f"{' and '.join(names)} say {found[0]} x {found[1]}: leave size out")
+                return found
+        if self.given is not None:
+            return self.size(*self.given)
+        names = " or ".join(key if isinstance(key, str) else " and ".join(key) for key in keys[:2])
+        there = ", ".join(str(key) for key in self.data)
+        raise NoSize(
+            f"{self.where}: has no image size, such as {names}, among its keys {there[:120]}: give "
+            "size=(width, height), --size WIDTHxHEIGHT, or size = [width, height] in a scene file"
+        )
 
     def size(self, width: Any, height: Any) -> tuple[int, int]:
         """Width and height as whole numbers of pixels."""
@@ -87,18 +105,12 @@ def as_number(value: Any, where: str) -> float:
 
 
 def _kind(value: Any) -> str:
+    if isinstance(value, Tagged):
+        return repr(value)
     if isinstance(value, (dict, list)):
         return f"a {type(value).__name__} of {len(value)}"
     text = " ".join(repr(value).split())
     return text if len(text) <= 40 else f"{text[:37]}..."
-
-
-def inverse(pose: np.ndarray) -> np.ndarray:
-    """The inverse of a rigid 4x4 transform."""
-    result = np.eye(4)
-    result[:3, :3] = pose[:3, :3].T
-    result[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-    return result
 
 
 def intrinsics(camera: Camera, models: dict[type[Camera], str], style: str) -> tuple[float, float, float, float]:
@@ -117,47 +129,3 @@ def single(cameras: dict[str, Camera], style: str) -> tuple[str, Camera]:
     if len(cameras) != 1:
         raise InputError(f"{style} holds one camera per file, not {len(cameras)}: write one file for each")
     return next(iter(cameras.items()))
-
-
-def undistorted(part: Section, coefficients: list[float], what: str) -> None:
-    """See that distortion that no model here has is zero."""
-    if any(coefficients):
-        raise part.error(f"{what} is not zero: no camera of mpcam has it; undistort the images, or fit another model")
-
-
-def pinhole_or_fisheye(
-    part: Section, fisheye: bool, size: tuple[int, int], frame: list[float], coefficients: list[float]
-) -> Camera:
-    """A KannalaBrandt camera, or one with OpenCV's coefficients; frame: fx, fy, cx, cy."""
-    if fisheye:
-        if len(coefficients) != 4:
-            raise part.error(f"a fisheye needs 4 distortion coefficients k1 to k4, not {len(coefficients)}")
-        return part.camera(KannalaBrandt, *size, *frame, coefficients)
-    if len(coefficients) not in (0, 4, 5, 8, 12, 14):
-        raise part.error(f"{len(coefficients)} distortion coefficients are there, 0, 4, 5, 8, 12 or 14 are needed")
-    return radtan(part, size, frame, dict(zip(RADTAN, coefficients, strict=False)))
-
-
-def radtan(part: Section, size: tuple[int, int], frame: list[float], given: dict[str, float]) -> Camera:
-    """A camera with radial and tangential distortion, a Pinhole where that is zero; given: coefficients by name."""
-    kinds = (("thin prism distortion", ("s1", "s2", "s3", "s4")), ("a tilted sensor", ("tau_x", "tau_y")))
-    for kind, names in kinds:
-        undistorted(part, [given.get(name, 0.0) for name in names], f"{kind} ({', '.join(names)})")
-    k, p = ([given.get(f"{letter}{i + 1}", 0.0) for i in range(count)] for letter, count in (("k", 6), ("p", 2)))
-    if not any((*k, *p)):
-        return part.camera(Pinhole, *size, *frame)
-    return part.camera(BrownConrady, *size, *frame, k, p)
-
-
-def coefficients(camera: BrownConrady) -> dict[str, float]:
-    """k1 to k6, p1 and p2 by name."""
-    return {f"{letter}{i + 1}": float(value) for letter in "kp" for i, value in enumerate(getattr(camera, letter))}
-
-
-def coefficients_held(camera: BrownConrady, names: str, style: str) -> list[float]:
-    """Those that a format has a place for, in its order; raises InputError where others are not zero."""
-    given = coefficients(camera)
-    lost = [name for name, value in given.items() if value and name not in names.split()]
-    if lost:
-        raise InputError(f"{style} has no place for {', '.join(lost)} of {camera!r}: it holds {names}")
-    return [given[name] for name in names.split()]

@@ -1,22 +1,35 @@
-"""YAML as calibration files have it: also OpenCV's first line and its matrices."""
+"""YAML as calibration files have it: OpenCV's first line and matrices, dotted keys, several documents."""
 
+from dataclasses import dataclass
 from typing import Any
 
 from mpcam.errors import InputError
 
 
-def read_yaml(text: str, name: str) -> Any:
-    """The document in a text; an OpenCV matrix is a dictionary with rows, cols and data.
+@dataclass(frozen=True)
+class Tagged:
+    """A value with a tag that is not known: of no harm where nobody asks for it."""
 
-    name: the file's, for messages. Raises InputError, with the line, for a text that is no YAML, has other tags or
-    gives a key twice.
+    tag: str
+
+    def __repr__(self) -> str:
+        return f"a value tagged {self.tag}, which is no plain YAML: write numbers and lists (array.tolist())"
+
+
+def read_yaml(text: str, name: str) -> Any:
+    """The first document in a text; an OpenCV matrix is a dictionary with rows, cols (or sizes), dt and data.
+
+    name: the file's, for messages. Raises InputError, with the line, for a text that is no YAML or gives a key twice.
     """
     import yaml
 
     class Loader(yaml.SafeLoader):
-        """Knows the tag of matrices, and keys that are there twice."""
+        """Knows the tags of matrices and tuples, and keys that are there twice."""
 
-    def mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    def mapping(loader: yaml.SafeLoader, node: yaml.Node) -> dict[Any, Any]:
+        if not isinstance(node, yaml.MappingNode):
+            problem = f"{node.tag} must be a mapping"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
         seen: set[str] = set()
         for key, _ in node.value:
             if str(key.value) in seen:
@@ -25,14 +38,21 @@ def read_yaml(text: str, name: str) -> Any:
             seen.add(str(key.value))
         return loader.construct_mapping(node, deep=True)
 
-    for tag in ("map", "opencv-matrix"):
+    def sequence(loader: yaml.SafeLoader, node: Any) -> list[Any]:
+        return loader.construct_sequence(node, deep=True)
+
+    for tag in ("map", "opencv-matrix", "opencv-nd-matrix"):
         Loader.add_constructor(f"tag:yaml.org,2002:{tag}", mapping)
+    Loader.add_constructor("tag:yaml.org,2002:python/tuple", sequence)
+    unknown: Any = None  # the tag of all that have no constructor
+    Loader.add_constructor(unknown, lambda loader, node: Tagged(node.tag.replace("tag:yaml.org,2002:", "!!")))
     if text.startswith("%YAML:"):  # OpenCV's spelling of the directive
         text = "#" + text
     try:
-        return yaml.load(text, Loader)  # a SafeLoader
+        documents = [found for found in yaml.load_all(text, Loader) if found is not None]  # a SafeLoader
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         raise InputError(f"{name}{line}: not YAML as calibration files use it: {error.problem}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as error:
         raise InputError(f"{name}: not YAML as calibration files use it: {' '.join(str(error).split())}") from None
+    return documents[0] if documents else None

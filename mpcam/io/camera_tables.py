@@ -1,7 +1,7 @@
 """Tables [camera] of scene files: one for each model in the register of cameras, with the keys that the model takes."""
 
 import functools
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from msgspec import Meta, Struct, defstruct
 
@@ -25,8 +25,22 @@ class CameraTable(Table, tag_field="model", frozen=True):
     camera_from_world: tuple[Row, Row, Row, Row] | None = None  # instead of eye and target
 
 
-class CameraFile(Table, tag_field="model", frozen=True):
-    """[camera] of models that consist of arrays: they are in a file, which has a pose of its own too."""
+class CameraFile(Table, frozen=True):
+    """[camera] with a file that holds the camera: calibrations of other programs, camera JSON, EXR images."""
+
+    file: str
+    name: str | None = None  # which of several
+    model: str | None = None  # what it must be
+    size: tuple[Pixels, Pixels] | None = None  # width, height; what the file has is resized to it
+    pose: list[Row] | Literal["file"] | None = None  # camera_from_world, rounded or without its last row; or the file's
+    eye: Vector | None = None
+    target: Vector | None = None
+    up: Vector | None = None
+    camera_from_world: tuple[Row, Row, Row, Row] | None = None
+
+
+class ArrayTable(Table, tag_field="model", frozen=True):
+    """[camera] of models that consist of arrays, for which there are no keys: they need a file, see CameraFile."""
 
     file: str
     eye: Vector | None = None
@@ -40,7 +54,7 @@ def camera_table(model: type[Camera]) -> type[Struct]:
     """The type of the table of one model."""
     name = snake_case(model.__name__)
     if not fits_a_table(model):
-        return defstruct(name, [], bases=(CameraFile,), tag=name, frozen=True, kw_only=True)
+        return defstruct(name, [], bases=(ArrayTable,), tag=name, frozen=True, kw_only=True)
     fields: list[Any] = []
     for key, (kind, default) in table_keys(model).items():
         kind = _limited(kind)
@@ -53,7 +67,7 @@ def any_camera_table() -> Any:
     return Union[tuple(map(camera_table, MODELS.values()))]  # noqa: UP007
 
 
-def model_of(table: CameraTable | CameraFile) -> type[Camera]:
+def model_of(table: CameraTable) -> type[Camera]:
     """The model that a table describes."""
     return next(model for model in MODELS.values() if isinstance(table, camera_table(model)))
 

@@ -1,4 +1,4 @@
-"""A camera from whatever holds one: its own JSON file, the header of an image, or a scene."""
+"""A camera from whatever holds one: a file of its own, the header of an image, a calibration, or a scene."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,29 +9,29 @@ if TYPE_CHECKING:
     from mpcam.cameras import Camera
 
 
-def load_camera(path_or_name: str | Path) -> "Camera":
+def load_camera(path_or_name: str | Path, *, size: tuple[int, int] | None = None) -> "Camera":
     """The camera in a .json file (see `camera_to_json`), a calibration, the header of an .exr, or else of a scene.
 
-    Calibrations are .yaml, .yml, .txt and transforms.json files that `read_calibration` reads, with one camera. Scenes
-    are what `load_scene` reads. Raises InputError for files that are missing, unreadable or without a camera, and for
-    calibrations of several cameras.
+    path_or_name: FILE, or FILE:NAME for one of several cameras. Calibrations are the files that `read_calibration`
+    reads, and folders with COLMAP's models. Scenes are what `load_scene` reads. size: width and height, pixels; the
+    camera is resized to it, and has it where its file says none. Raises InputError for files that are missing,
+    unreadable or without a camera, and for names that are not there.
     """
-    from mpcam.io.camera_files import SUFFIXES, read_camera_file
+    from mpcam.cameras.change import resized
+    from mpcam.io.camera_files import SUFFIXES, read_camera_file, split_name
     from mpcam.io.scenes import load_scene
 
-    kind = Path(path_or_name).suffix.lower()
-    if kind in (".yaml", ".yml", ".txt") or Path(path_or_name).name == "transforms.json":
-        return _only(path_or_name)
-    return read_camera_file(path_or_name) if kind in SUFFIXES else load_scene(path_or_name).scene.camera
+    path, name = split_name(path_or_name)
+    if Path(path).suffix.lower() in SUFFIXES or _is_folder(path):
+        return read_camera_file(path, name, size).camera
+    if name is not None:
+        raise InputError(f"{path}: is a scene, which has one camera: leave out {name!r}, or give a camera's file")
+    camera = load_scene(path_or_name).scene.camera
+    return camera if size is None else resized(camera, *size)
 
 
-def _only(path: str | Path) -> "Camera":
-    """The only camera of a calibration."""
-    from mpcam.io.calibration import read_calibration
-
-    cameras = read_calibration(path)
-    if len(cameras) > 1:
-        names = ", ".join(cameras)
-        names = names if len(names) < 60 else f"{names[:57]}..."
-        raise InputError(f"{path}: has {len(cameras)} cameras ({names}): one is needed; pick it with read_calibration")
-    return next(iter(cameras.values()))
+def _is_folder(path: str) -> bool:
+    try:
+        return Path(path).is_dir()
+    except (OSError, ValueError):  # a name too long, or with a zero byte
+        return False

@@ -1,5 +1,6 @@
 """Points in text: a row each, as spreadsheets, NumPy and most tools write them."""
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,12 +9,15 @@ import numpy as np
 
 from mpcam.errors import InputError
 
+_BEGINS = re.compile(r"[-+]?[.,]?\d")  # how numbers begin, also those that are none, such as 1,5 or 1_000
+
 
 def read_points(source: str | Path) -> np.ndarray:
     """Points (N, 3) float64 from a text file, or from standard input if source is "-".
 
-    A row holds x, y, z, separated by commas, semicolons or blanks; further columns are ignored, and so are empty rows,
-    what follows a #, and a first row without numbers (a header). Raises InputError, with the line, for anything else.
+    A row holds x, y, z, separated by semicolons, by commas or by blanks, with a point before decimals; further columns
+    are ignored, and so are empty rows, what follows a #, and a first row without any number (a header). Raises
+    InputError, with the line, for anything else.
     """
     if source == "-":
         return parse_points(sys.stdin, "standard input")
@@ -42,18 +46,40 @@ def parse_points(lines: Iterable[str], name: str) -> np.ndarray:
     points = []
     header = True
     for number, line in enumerate(lines, 1):
-        cells = line.split("#", 1)[0].replace(",", " ").replace(";", " ").split()
-        if not cells:
+        text = line.split("#", 1)[0].strip()
+        if not text:
             continue
-        try:
-            points.append([float(cell) for cell in cells[:3]])
-        except ValueError:
-            if not header:
-                raise InputError(f"{name}:{number}: {line.strip()!r:.60}: give three numbers x, y, z") from None
-        else:
-            if len(cells) < 3:
-                raise InputError(f"{name}:{number}: {line.strip()!r:.60} is too short: give three numbers x, y, z")
+        cells = _cells(text)
+        numbers = [_number(cell) for cell in cells]
+        if header and any(cells) and not any(map(_BEGINS.match, cells)) and all(value is None for value in numbers):
+            header = False
+            continue
         header = False
+        where = f"{name}:{number}: {line.strip()!r:.60}"
+        if ";" in text and any("," in cell for cell in cells):
+            raise InputError(f"{where}: give decimals with a point, as 1.5, and three numbers x, y, z")
+        if None in numbers[:3]:
+            raise InputError(f"{where}: give three numbers x, y, z")
+        if len(cells) < 3:
+            raise InputError(f"{where} is too short: give three numbers x, y, z")
+        points.append(numbers[:3])
     if not points:
         raise InputError(f"{name}: has no points: give rows of x, y, z")
     return np.array(points, np.float64)
+
+
+def _cells(text: str) -> list[str]:
+    """What stands between semicolons, or else commas, or else blanks; without quotes around it."""
+    separator = next((sign for sign in ";," if sign in text), None)
+    cells = text.split(separator)
+    if separator and not cells[-1].strip():  # a separator at the end of the row
+        cells = cells[:-1]
+    return [cell.strip().strip("\"'").strip() for cell in cells]
+
+
+def _number(cell: str) -> float | None:
+    """A number, NaN and infinity among them; None for other texts, such as 1_000."""
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None

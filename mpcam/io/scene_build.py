@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.geometry.mesh import Material, Mesh
-from mpcam.io.camera_tables import any_camera_table
+from mpcam.io.camera_tables import CameraFile, any_camera_table
 from mpcam.io.images import read_image
 from mpcam.io.scene_camera import build_camera, default_camera
 from mpcam.io.scene_mirror import build_mirror
@@ -28,7 +28,8 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         with text.at("mesh"):
             camera = default_camera(bounds)
     else:
-        camera = build_camera(text.read(any_camera_table(), "camera"), bounds, folder, text)
+        named = isinstance(table.camera, dict) and "file" in table.camera
+        camera = build_camera(text.read(CameraFile if named else any_camera_table(), "camera"), bounds, folder, text)
     if table.light is None:
         lights: tuple[Light, ...] = (default_light(camera),)
     else:

@@ -13,6 +13,8 @@ from mpcam.cameras.registry import MODELS, snake_case
 from mpcam.cameras.serialize import camera_to_dict
 from mpcam.cameras.tables import fits_a_table, from_table, table_keys, to_table
 from mpcam.errors import InputError
+from mpcam.io.calibration_parts import Section
+from mpcam.io.calibration_poses import Poses
 from mpcam.io.camera_files import read_camera_file
 from mpcam.io.camera_tables import CameraFile, CameraTable, model_of
 from mpcam.io.scene_text import SceneText
@@ -29,7 +31,7 @@ def default_camera(bounds: np.ndarray, up: str = "z", size: tuple[int, int] = (5
     bounds: (2, 3) smallest and largest coordinates. up: "y" or "z", the vertical axis; the view is from the front, the
     right and above, where the front is -y with z up and +z with y up. size: width, height in pixels.
     """
-    return Radial.paraboloid(*size, camera_from_world=_overview(bounds, math.pi, up))
+    return Radial.paraboloid(*size, camera_from_world=overview(bounds, math.pi, up))
 
 
 def build_camera(table: CameraTable | CameraFile, bounds: np.ndarray, folder: Path, text: SceneText) -> Camera:
@@ -38,12 +40,9 @@ def build_camera(table: CameraTable | CameraFile, bounds: np.ndarray, folder: Pa
     Raises InputError, with the line of the key, for poses that are incomplete or given twice, for fields of view that
     the projection cannot reach, and for what the camera itself refuses.
     """
-    model = model_of(table)
     if isinstance(table, CameraFile):
-        with text.at("camera", "file"):
-            camera = _from_file(folder / table.file, model)
-        posed = table.camera_from_world is not None or table.eye is not None or table.target is not None
-        return camera.with_pose(_pose(table, bounds, camera, text)) if posed else camera
+        return _from_file(table, bounds, folder, text)
+    model = model_of(table)
     given = {key: value for key in table_keys(model) if (value := getattr(table, key)) is not None}
     with text.at("camera"):
         if model.ray_geometry == "parallel" and "scale" not in given:  # no place makes their view wider
@@ -71,11 +70,35 @@ def camera_to_toml(camera: Camera) -> str:
     return "\n".join(["[camera]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items())]) + "\n"
 
 
-def _from_file(path: Path, model: type[Camera]) -> Camera:
-    camera = read_camera_file(path)
-    if type(camera) is not model:
-        raise InputError(f"{path} holds a {type(camera).__name__}: give model = {snake_case(type(camera).__name__)!r}")
-    return camera
+def _from_file(table: CameraFile, bounds: np.ndarray, folder: Path, text: SceneText) -> Camera:
+    path = folder / table.file
+    with text.at("camera", "file" if table.name is None else "name"):
+        camera, placed = read_camera_file(path, table.name, table.size)
+    own = snake_case(type(camera).__name__)
+    if table.model not in (None, own):
+        raise text.error(("camera", "model"), f"{path} holds a {type(camera).__name__}: give model = {own!r}, or none")
+    others = [key for key in ("eye", "target", "up", "camera_from_world") if getattr(table, key) is not None]
+    if table.pose is not None:
+        if others:
+            raise text.error(("camera", others[0]), f"give pose or {others[0]}, not both")
+        return camera if table.pose == "file" else camera.with_pose(_rigid(table.pose, text))
+    if placed and (not others or others == ["up"]):
+        if others:
+            raise text.error(("camera", "up"), "the camera has the pose of its file: give eye and target too")
+        return camera
+    with text.at("camera"):
+        return camera.with_pose(_pose(table, bounds, camera, text))
+
+
+def _rigid(rows: Any, text: SceneText) -> np.ndarray:
+    """A pose as rows, put right where it is rounded."""
+    poses = Poses()
+    with text.at("camera", "pose"):
+        found = poses.read(Section(text.name, {"pose": [list(row) for row in rows]}), "pose")
+    if found is None:
+        raise text.error(("camera", "pose"), poses.lost[0][1])
+    poses.warn()
+    return found
 
 
 def _pose(table: CameraTable | CameraFile, bounds: np.ndarray, camera: Camera, text: SceneText) -> Any:
@@ -88,7 +111,7 @@ def _pose(table: CameraTable | CameraFile, bounds: np.ndarray, camera: Camera, t
         return np.array(table.camera_from_world)
     up = table.up or (0.0, 0.0, 1.0)
     if table.eye is None and table.target is None:
-        return _overview(bounds, _field_of_view(camera), "z", up)
+        return overview(bounds, field_of_view(camera), "z", up)
     if table.eye is None or table.target is None:
         given, other = ("eye", "target") if table.target is None else ("target", "eye")
         raise text.error(("camera", given), f"give camera.{other} too, or neither of them")
@@ -97,7 +120,7 @@ def _pose(table: CameraTable | CameraFile, bounds: np.ndarray, camera: Camera, t
     return look_at(table.eye, table.target, up)
 
 
-def _field_of_view(camera: Camera) -> float:
+def field_of_view(camera: Camera) -> float:
     """Full angle of the cone around the axis that the image shows, radians; 0 for parallel rays.
 
     Its border is seen at the border of the image, or where the view ends within it.
@@ -112,7 +135,7 @@ def _field_of_view(camera: Camera) -> float:
     return 2.0 * float(angle[border].min() if border.any() else angle.max())
 
 
-def _overview(bounds: np.ndarray, fov: float, axis: str, up: Any = None) -> np.ndarray:
+def overview(bounds: np.ndarray, fov: float, axis: str, up: Any = None) -> np.ndarray:
     """Pose that looks at the center of the box from where all of it lies within fov (radians; 0: parallel rays)."""
     toward = np.array([0.6, 0.5, 1.0] if axis == "y" else [0.6, -1.0, 0.5])
     toward /= np.linalg.norm(toward)

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,13 @@ class SceneFile:
     scene: Scene
     compare: CompareSettings = field(default_factory=CompareSettings)
     path: Path | None = None
+
+    @property
+    def up(self) -> str:
+        """The axis, "y" or "z", that points up: z in scenes, y in most mesh files."""
+        if self.path is None or self.path.suffix.lower() in (".toml", *_VERTICAL_Z):
+            return "z"
+        return "y"
 
 
 def load_scene(path_or_name) -> SceneFile:
@@ -87,8 +94,9 @@ def _from_mesh(path: Path) -> SceneFile:
     from mpcam.geometry.load import load_mesh
 
     mesh = load_mesh(path)
-    camera = default_camera(bounds_of((mesh,)), "z" if path.suffix.lower() in _VERTICAL_Z else "y")
-    return SceneFile(Scene((mesh,), camera=camera, lights=(default_light(camera),), name=path.stem), path=path)
+    bare = SceneFile(Scene((mesh,), name=path.stem), path=path)
+    camera = default_camera(bounds_of((mesh,)), bare.up)
+    return replace(bare, scene=replace(bare.scene, camera=camera, lights=(default_light(camera),)))
 
 
 def _compare(table: CompareTable, text: SceneText) -> CompareSettings:
