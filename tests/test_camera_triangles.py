@@ -297,7 +297,7 @@ def test_images_near_a_pixel_are_those_of_its_triangle(name):
     camera = CAMERAS[name]()
     mesh = around(camera, 120, 0.8)
     hits = mp.rasterize(camera, mesh)
-    rows, columns = np.nonzero(hits.mask)
+    rows, columns = (index[::7] for index in np.nonzero(hits.mask))
     pixels = np.stack([columns + 0.5, rows + 0.5], -1)
     points = hits.points[rows, columns]
     near, every = camera.project_near(points, pixels), camera.project(points)
