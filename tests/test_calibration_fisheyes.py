@@ -109,6 +109,8 @@ def test_woodscape_mistakes(tmp_path):
         ({"model": "warp", "k1": 1}, "model 'warp' is not known here: radial_poly is"),
         ({"k1": 0}, "k1 is 0: pixels per radian"),
         ({"width": None}, "has no image size, such as width and height"),
+        ({"poly_order": 3}, "k1, k2, k3, k4 are there and poly_order is 3: k1, k2, ... up to it are needed"),
+        ({"poly_order": 1e300}, "poly_order is 1e[+]300"),
     ):
         path.write_text(json.dumps(woodscape(**changes)[0]))
         with pytest.raises(mp.InputError, match=message):

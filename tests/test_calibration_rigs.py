@@ -311,6 +311,9 @@ def test_basalt_mistakes(tmp_path):
     path.write_text(basalt(("ds", frame | {"xi": 0.1})))
     with pytest.raises(mp.InputError, match=r"intrinsics\[0\]: intrinsics: alpha is missing"):
         mp.read_calibration(path)
+    path.write_text(basalt(("pinhole", frame), places=[{"px": 1}]))
+    with pytest.warns(UserWarning, match=r"T_imu_cam\[0\]: qw is missing: the lens is read"):
+        assert mp.read_calibration(path)["cam0"] == mp.Pinhole(512, 512, 190.98, 190.97, 255.43, 257.4)
     rounded = {
         key: round(value, 3) for key, value in place(Rotation.from_rotvec([0.3, -0.2, 0.9]), [0.1, 0, 0]).items()
     }

@@ -3,6 +3,7 @@
 The center of the first pixel is at (0, 0) there. World is the frame of the first camera.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,8 @@ def read(document: Document) -> dict[str, Camera]:
     part = Section(document.where, _inside(Section(document.where, document.tree).data), document.size)
     lenses, sizes, places = (_list(part, key) for key in ("intrinsics", "resolution", "T_imu_cam"))
     poses = Poses()
-    bodies = [_from_body(part, number, place, poses) for number, place in enumerate(places)]
+    names = [f"{part.where}: T_imu_cam[{number}]" for number in range(len(places))]
+    bodies = [poses.made(name, partial(_in_body, name, place)) for name, place in zip(names, places, strict=True)]
     cameras = {}
     for number, lens in enumerate(lenses):
         inner = Section(f"{part.where}: intrinsics[{number}]", lens, part.given)
@@ -64,12 +66,11 @@ def _list(part: Section, key: str) -> list[Any]:
     return found
 
 
-def _from_body(part: Section, number: int, place: Any, poses: Poses) -> np.ndarray | None:
+def _in_body(where: str, place: Any) -> np.ndarray:
     """The pose of a camera in the frame of the IMU."""
-    inner = Section(f"{part.where}: T_imu_cam[{number}]", place)
+    inner = Section(where, place)
     w, x, y, z = (inner.number(f"q{axis}") for axis in "wxyz")
-    shift = [inner.number(f"p{axis}") for axis in "xyz"]
-    return poses.rigid(inner.where, rotated(quaternion_matrix(w, x, y, z), shift))
+    return rotated(quaternion_matrix(w, x, y, z), [inner.number(f"p{axis}") for axis in "xyz"])
 
 
 def _camera(part: Section) -> Camera:

@@ -83,7 +83,7 @@ def _from_imu(part: Section, poses: Poses) -> np.ndarray | None:
 
 
 def _camera(part: Section) -> Camera:
-    model = part.get("camera_model")
+    model = str(part.get("camera_model"))
     if model not in _LEADING:
         raise part.error(f"camera_model {model!r} is not known here: allowed are {', '.join(_LEADING)}")
     distortion = str(part.get("distortion_model", "none")).lower()

@@ -32,8 +32,8 @@ _TANGENTIAL = ("p1", "p2")
 def recognizes(document: Document) -> bool:
     """Whether there is a list of frames with a matrix each."""
     data = document.mapping()
-    frames = [frame for key in _FRAMES for frame in (data.get(key) or ()) if isinstance(data.get(key), list)]
-    return any(isinstance(frame, dict) and "transform_matrix" in frame for frame in frames)
+    lists = [data[key] for key in _FRAMES if isinstance(data.get(key), list)]
+    return any(isinstance(frame, dict) and "transform_matrix" in frame for frames in lists for frame in frames)
 
 
 def read(document: Document) -> dict[str, Camera]:

@@ -4,6 +4,7 @@ A lens is of use without its pose, so a pose that cannot be used costs a warning
 """
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -88,12 +89,15 @@ class Poses:
 
     def read(self, part: Section, key: str) -> np.ndarray | None:
         """The rigid transform of a key, or None with a note."""
+        return self.made(f"{part.where}: {key}", lambda: matrix(part, key))
+
+    def made(self, name: str, make: Callable[[], np.ndarray]) -> np.ndarray | None:
+        """The rigid transform of a matrix that `make` finds in the file, or None with a note, also where it raises."""
         try:
-            found = matrix(part, key)
+            found = make()
         except InputError as error:
-            text = str(error).removeprefix(f"{part.where}: ").removeprefix(f"{key}: ")
-            return self.lose(f"{part.where}: {key}", text)
-        return self.rigid(f"{part.where}: {key}", found)
+            return self.lose(name, str(error).removeprefix(f"{name}: "))
+        return self.rigid(name, found)
 
     def warn(self) -> None:
         """Say what was put right, and what was left out."""

@@ -4,6 +4,8 @@ The vehicle's axes are x ahead, y left, z up; the camera's are as here. Offsets 
 image.
 """
 
+import numpy as np
+
 from mpcam.cameras import AnglePolynomial, Camera
 from mpcam.io.calibration_document import Document
 from mpcam.io.calibration_parts import Section
@@ -28,8 +30,11 @@ def read(document: Document) -> dict[str, Camera]:
         raise part.error(f"model {model!r} is not known here: radial_poly is")
     width, height = part.image_size(("width", "height"))
     names = [key for key in part.data if str(key)[:1] == "k" and str(key)[1:].isdigit()]
-    order = int(part.number("poly_order", max((int(name[1:]) for name in names), default=0)))
-    first, *rest = [part.number(f"k{power}", 0.0) for power in range(1, order + 1)] or [0.0]
+    powers = sorted(int(name[1:]) for name in names)
+    order = part.number("poly_order", len(powers))
+    if powers != list(range(1, len(powers) + 1)) or order != len(powers):
+        raise part.error(f"{', '.join(names)} are there and poly_order is {order:g}: k1, k2, ... up to it are needed")
+    first, *rest = [part.number(f"k{power}") for power in powers] or [0.0]
     if not first > 0:
         raise part.error(f"k1 is {first:g}: pixels per radian at the center, a number above 0, are needed")
     # The middle of the image is at (width - 1) / 2 for WoodScape, which counts from the first pixel's center.
@@ -37,10 +42,15 @@ def read(document: Document) -> dict[str, Camera]:
     focal = [first, first * part.number("aspect_ratio", 1.0)]
     camera = part.camera(AnglePolynomial, width, height, *focal, *center, [value / first for value in rest])
     if "extrinsic" in whole:
-        place, poses = whole.part("extrinsic"), Poses()
-        x, y, z, w = place.numbers("quaternion", 4)
-        shift = place.numbers("translation", 3)
-        vehicle = poses.rigid(f"{place.where}: quaternion", rotated(quaternion_matrix(w, x, y, z), shift))
+        poses = Poses()
+        vehicle = poses.made(f"{whole.where}: extrinsic: quaternion", lambda: _place(whole))
         poses.warn()
         camera = camera if vehicle is None else camera.with_pose(inverse(vehicle))
     return {str(whole.get("name", "camera")): camera}
+
+
+def _place(whole: Section) -> np.ndarray:
+    """The camera in the vehicle."""
+    place = whole.part("extrinsic")
+    x, y, z, w = place.numbers("quaternion", 4)
+    return rotated(quaternion_matrix(w, x, y, z), place.numbers("translation", 3))

@@ -72,7 +72,7 @@ def _in_text(path: str | Path, name: str | None, size: tuple[int, int] | None) -
     from mpcam.io.calibration_parts import NoSize
 
     data = Document(path).mapping()
-    if "schema" in data or data.get("model") in MODELS:
+    if "schema" in data or str(data.get("model")) in MODELS:
         try:
             return FoundCamera(_chosen(path, {"": camera_from_dict(data)}, name), True)
         except InputError as error:
