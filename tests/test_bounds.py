@@ -37,7 +37,16 @@ def test_outlines_hold_every_sampled_point(camera):
     assert_holds(mp.Box(found.low.T, found.high.T, found.valid), low, high, seen, 1e-9)
 
 
-@pytest.mark.parametrize("quick", [False, True])
+LONG = ("scaramuzza", "division")
+"""Whose boxes take half a minute to compile: `mpcam stress` has them too."""
+BOXES = [
+    pytest.param(name, quick, marks=pytest.mark.slow) if name in LONG and not quick else (name, quick)
+    for name in NAMES
+    for quick in (False, True)
+]
+
+
+@pytest.mark.parametrize("camera, quick", BOXES, indirect=["camera"])
 def test_boxes_hold_in_float32_kernels(camera, quick):
     corners = triangles(500, seed=5)
     low, high, seen = extent(camera, corners)

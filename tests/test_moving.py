@@ -9,6 +9,7 @@ from mpcam.effects.reflection import Reflection
 from mpcam.geometry.moved import moved
 from mpcam.rendering.shade import SHADINGS, shade
 
+pytestmark = pytest.mark.filterwarnings("ignore:shading='texture'")  # of the scenes here, one has a texture
 METHODS = {"invert": {}, "vertex": {"level": 1}, "cubemap": {"resolution": 40}, "hemicube": {}, "raytrace": {}}
 LIGHTS = (mp.DirectionalLight((0.3, -0.5, -1)), mp.PointLight((0.5, 1.0, 2.0), (3, 3, 3)))
 
@@ -30,7 +31,8 @@ def scene(seed):
     blob = mp.Mesh(given * [1, 2, 1], ball.faces)
     blob = mp.Mesh(blob.vertices, blob.faces, normals=blob.smooth_normals(), materials=mp.Material((0.9, 0.4, 0.2)))
     colors = rng.uniform(0.1, 1, (len(ball.vertices), 3))
-    ball = mp.Mesh(ball.vertices, ball.faces, normals=ball.normals, colors=colors)
+    checks = mp.Material(texture=rng.uniform(0.2, 1, (4, 5, 3)).astype(np.float32))
+    ball = mp.Mesh(ball.vertices, ball.faces, ball.normals, rng.uniform(0, 2, (len(ball.vertices), 2)), colors, checks)
     return mp.Scene((ball, soup(60, seed, 0.4), blob), lights=LIGHTS, background=(0.1, 0.2, 0.3))
 
 

@@ -45,6 +45,6 @@ def test_the_shell_says_it_in_a_line(tmp_path):
         [sys.executable, "-m", "mpcam", "render", *options], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert done.stderr.splitlines()[:2] == [
-        "mpcam: a.obj: material x is in no material file (usemtl, mtllib): its faces are gray",
-        "mpcam: shading='texture': 'a' has no texture, so this is 'color'",
+        "mpcam: warning: a.obj: material x is in no material file (usemtl, mtllib): its faces are gray",
+        "mpcam: warning: shading='texture': 'a' has no texture, so this is 'color'",
     ]

@@ -31,7 +31,7 @@ class DeviceMesh:
         base = mesh.base if isinstance(mesh, MovedMesh) else mesh if frame else None
         self.base = None if base is None else device_mesh(base)  # of the mesh before it moved, or with its own frame
         self.used = _used(mesh) if self.base is None else self.base.used
-        self.anchor, self.scale = frame or _frame(self.used_of(mesh))
+        self.anchor, self.scale, self.reaches_far = (*frame, True) if frame else _frame(self.used_of(mesh))
         if self.base is None:
             self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
         else:
@@ -102,8 +102,8 @@ def _used(mesh: Mesh) -> np.ndarray | None:
     return None if used.all() else np.flatnonzero(used)
 
 
-def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float]:
-    """Anchor (3,) and scale of positions (V, 3): of all, or of where most are if some are very far away.
+def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float, bool]:
+    """Anchor (3,) and scale of positions (V, 3): of all, or of where most are if some are very far away; and if so.
 
     The scale is a power of two, the anchor a multiple of an eighth of it.
     """
@@ -112,21 +112,22 @@ def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float]:
     if not np.isfinite(ends).all():
         vertices = vertices[np.isfinite(vertices).all(axis=1)]
         if len(vertices) == 0:
-            return np.zeros(3), 1.0
+            return np.zeros(3), 1.0, False
         low, high = vertices.min(axis=0), vertices.max(axis=0)
     center, extent = 0.5 * low + 0.5 * high, float((0.5 * high - 0.5 * low).max())
     sample = vertices[:: max(len(vertices) // _SAMPLE, 1)]
     middle = np.median(sample, axis=0)
     usual = 4.0 * float(np.median(np.abs(sample - middle).max(axis=1)))
-    if 0 < usual and extent > _FAR * usual:
+    far = 0 < usual and extent > _FAR * usual
+    if far:
         center, extent = middle, usual
     if extent == 0:
-        return center, 1.0
+        return center, 1.0, False
     scale = float(2.0 ** np.clip(np.ceil(np.log2(extent)), -1000, 1000))
     step = scale / 8
     with np.errstate(over="ignore", invalid="ignore"):
         snapped = np.rint(center / step) * step
-    return np.where(np.isfinite(snapped), snapped, center), scale
+    return np.where(np.isfinite(snapped), snapped, center), scale, far
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:

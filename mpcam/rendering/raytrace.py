@@ -24,24 +24,25 @@ from mpcam.tracing.variant import mitsuba
 
 def rays_around(posed: PosedRays, origin: np.ndarray, unit: float) -> tuple[Any, Any, Any]:
     """Origin, direction and validity of rays, row by row, in world axes around a point (3,) in a unit."""
-    rotation, middle = posed.pose[:3, :3], frame_origin(posed.pose)
-    numbers = opaque_numbers([*rotation.ravel(), *((middle - origin) / unit), 1.0 / unit])
+    rotation = posed.pose[:3, :3]
+    numbers = opaque_numbers([*rotation.ravel(), *((rotation @ origin + posed.pose[:3, 3]) / unit), 1.0 / unit])
     columns, shift, scale = [numbers[i:9:3] for i in range(3)], numbers[9:12], numbers[12]
 
     def turned(vector: Any) -> list[Any]:
         return [sum(column[j] * vector[j] for j in range(3)) for column in columns]
 
-    start = turned(posed.ray.origin)
-    return [start[i] * scale + shift[i] for i in range(3)], turned(posed.ray.direction), posed.ray.valid
+    start = [posed.ray.origin[i] * scale - shift[i] for i in range(3)]
+    return turned(start), turned(posed.ray.direction), posed.ray.valid
 
 
 class RayTraced(Moving):
     """Frames by tracing each pixel's ray through a tree over the triangles.
 
-    Rays and vertices are brought to float32 around the point that the rays leave from, or the middle of these: not as
-    the other methods do it, so that comparing with them shows what rounding costs either. Triangles with a corner that
-    is not finite are left out of the tree, which may not hold such numbers. rays: others than the camera's, in the
-    world, one for each of its pixels, row by row: origin (N, 3), unit direction (N, 3), valid (N,).
+    The same rays and the same float32 vertices as the kernels use; but where something is far away, rays and vertices
+    are brought to float32 around the point that the rays leave from, not as the other methods do it, so that comparing
+    with them shows what rounding costs. Triangles with a corner that is not finite are left out of the tree, which may
+    not hold such numbers. rays: others than the camera's, in the world, one for each of its pixels, row by row: origin
+    (N, 3), unit direction (N, 3), valid (N,).
     """
 
     method = "raytrace"
@@ -62,7 +63,7 @@ class RayTraced(Moving):
             return middle
         if self.device.stands_apart(self.mesh, middle) is not None:
             return middle
-        return np.rint(middle / unit) * unit
+        return np.rint(middle / unit) * unit if self.device.reaches_far else self.device.anchor
 
     @exclusive
     def aim(self, camera: Camera) -> None:
