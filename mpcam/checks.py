@@ -18,6 +18,15 @@ def is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and bool(np.isfinite(value))
 
 
+def reads_as_number(text: str) -> bool:
+    """Whether a text is a number, as `float` reads it."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def whole_number(
     name: str, value: Any, low: int, high: int | None = None, *, of: str = "", unit: str = "", hint: str = ""
 ) -> int:

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mpcam.cameras.arcs import outer_bound, radial_bound, radial_bound_rough
+from mpcam.cameras.fields import Number, Positive
 from mpcam.cameras.outline import Outline, VertexView, small_outline, symmetric_vertex_view
 from mpcam.cameras.profiles import Profile, bulges_outward
 from mpcam.cameras.symmetric import finite_pixel, project_centered, symmetric_image, symmetric_ray, within
@@ -38,10 +39,11 @@ class _View:
     pixels_per_radius: float = 1.0
 
 
-class Calibrated:
-    """Rays, images and boxes from the functions r = f(theta), f' and the inverse that a model supplies.
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LensFields:
+    """The fields with which every calibrated lens begins.
 
-    Derived fields, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
+    Derived ones, set at construction where all parameters are plain numbers: limit, the largest angle of the domain;
     rim, its radius in focal lengths; edge, an angle beyond which nothing lands in the image; convex, whether images of
     straight lines bulge away from the center up to there (see `Profile`). They are None and False in cameras whose
     parameters are traced by JAX.
@@ -49,16 +51,24 @@ class Calibrated:
 
     width: int
     height: int
-    fx: Any
-    fy: Any
-    cx: Any
-    cy: Any
+    fx: Positive
+    fy: Positive
+    cx: Number
+    cy: Number
+    limit: Any = dataclasses.field(default=None, init=False)
+    rim: Any = dataclasses.field(default=None, init=False)
+    edge: Any = dataclasses.field(default=None, init=False)
+    convex: bool = dataclasses.field(default=False, init=False)
+
+
+class Calibrated(LensFields):
+    """Rays, images and boxes from the functions r = f(theta), f' and the inverse that a model supplies.
+
+    A model adds its own numbers, a pose, and max_angle, the largest angle that it is to have.
+    """
+
     camera_from_world: Any
     max_angle: Any
-    limit: Any
-    rim: Any
-    edge: Any
-    convex: bool
 
     ray_geometry: ClassVar[RayGeometry] = "central"
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height", "convex")

@@ -5,7 +5,7 @@ import math
 from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.fields import Limits, Number, Positive, Share
+from mpcam.cameras.fields import Limits, Number, Share
 from mpcam.cameras.spheres import Spheres
 from mpcam.math import PI, Array, library, maximum, safe_sqrt, where
 
@@ -31,23 +31,13 @@ class DoubleSphere(Spheres, Camera):
     are not finite, an angle outside (0, pi], and poses that are not rigid.
     """
 
-    width: int
-    height: int
-    fx: Positive
-    fy: Positive
-    cx: Number
-    cy: Number
     xi: Annotated[Any, Limits(above=-1)]
     alpha: Share
     camera_from_world: Any = None
     max_angle: Number = PI
-    limit: Any = dataclasses.field(default=None, init=False)
-    rim: Any = dataclasses.field(default=None, init=False)
-    edge: Any = dataclasses.field(default=None, init=False)
     excess: Any = dataclasses.field(default=None, init=False)
     front: Any = dataclasses.field(default=None, init=False)
     back: Any = dataclasses.field(default=None, init=False)
-    convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("xi", "alpha")
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import Calibrated, described
-from mpcam.cameras.fields import Limits, Number, Positive
+from mpcam.cameras.fields import Limits
 from mpcam.math import PI, Array, atan2, cos, minimum, sin, tan
 
 
@@ -24,19 +24,9 @@ class FieldOfView(Calibrated, Camera):
     that are not finite, and poses that are not rigid.
     """
 
-    width: int
-    height: int
-    fx: Positive
-    fy: Positive
-    cx: Number
-    cy: Number
     omega: Annotated[Any, Limits(above=0, below=PI)]
     camera_from_world: Any = None
     max_angle: Annotated[Any, Limits(above=0, at_most=0.5 * PI)] = 0.5 * PI
-    limit: Any = dataclasses.field(default=None, init=False)
-    rim: Any = dataclasses.field(default=None, init=False)
-    edge: Any = dataclasses.field(default=None, init=False)
-    convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("omega",)
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.calibrated import Calibrated
-from mpcam.cameras.fields import Number, Positive
+from mpcam.cameras.fields import Number
 from mpcam.errors import InputError
 from mpcam.math import PI, Array, detach, first_true, invert_increasing, library, polynomial, sign_changes
 
@@ -30,19 +30,9 @@ class KannalaBrandt(Calibrated, Camera):
     are not finite, an angle outside (0, pi], and poses that are not rigid.
     """
 
-    width: int
-    height: int
-    fx: Positive
-    fy: Positive
-    cx: Number
-    cy: Number
     k: Annotated[Any, tuple[float, float, float, float]] = (0.0, 0.0, 0.0, 0.0)
     camera_from_world: Any = None
     max_angle: Number = PI
-    limit: Any = dataclasses.field(default=None, init=False)
-    rim: Any = dataclasses.field(default=None, init=False)
-    edge: Any = dataclasses.field(default=None, init=False)
-    convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("k",)
 

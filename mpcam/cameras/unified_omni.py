@@ -30,21 +30,11 @@ class UnifiedOmni(Spheres, Camera):
     are not finite, an angle outside (0, pi], and poses that are not rigid.
     """
 
-    width: int
-    height: int
-    fx: Positive
-    fy: Positive
-    cx: Number
-    cy: Number
     alpha: Share
     beta: Positive = 1.0
     camera_from_world: Any = None
     max_angle: Number = PI
-    limit: Any = dataclasses.field(default=None, init=False)
-    rim: Any = dataclasses.field(default=None, init=False)
-    edge: Any = dataclasses.field(default=None, init=False)
     excess: Any = dataclasses.field(default=None, init=False)
-    convex: bool = dataclasses.field(default=False, init=False)
 
     shape_fields = ("alpha", "beta")
 

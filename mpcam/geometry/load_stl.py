@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mpcam.checks import reads_as_number
 from mpcam.errors import InputError
 from mpcam.geometry.load_text import Say, decode_text
 from mpcam.geometry.mesh import Material, Mesh
@@ -69,7 +70,9 @@ def _text(text: str, path: Path, say: Say) -> Mesh:
     try:
         points = np.array([part[1:4] for part in parts if part[1]], np.float64).reshape(-1, 3)
     except ValueError:
-        bad = next(part for part in _PARTS.finditer(text) if part[2] and not all(map(_is_number, part.group(2, 3, 4))))
+        bad = next(
+            part for part in _PARTS.finditer(text) if part[2] and not all(map(reads_as_number, part.group(2, 3, 4)))
+        )
         line = text.count("\n", 0, bad.start()) + 1
         raise InputError(f"{path} line {line}: {' '.join(bad[0].split())[:60]!r} is not three numbers") from None
     counts = np.bincount((np.cumsum(opened) - 1)[corner], minlength=int(opened.sum()))
@@ -77,11 +80,3 @@ def _text(text: str, path: Path, say: Say) -> Mesh:
         raise ValueError("a facet without three corners")
     faces, _ = triangulate(counts, points, say)
     return Mesh(points, faces)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -4,6 +4,7 @@ import struct
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mpcam.checks import reads_as_number
 from mpcam.errors import InputError
 from mpcam.io.calibration_document import Document
 
@@ -33,7 +34,7 @@ def kind(document: Document) -> str | None:
         return None
     if len(words) > 4 and words[1].replace("_", "").isupper():
         return "cameras"
-    return "images" if len(words) > 9 and words[8].isdigit() and all(map(_is_number, words[1:8])) else None
+    return "images" if len(words) > 9 and words[8].isdigit() and all(map(reads_as_number, words[1:8])) else None
 
 
 def in_folder(document: Document) -> Document:
@@ -83,7 +84,7 @@ def images(document: Document) -> list[Image]:
             continue
         if not points:
             words, where = line.split(None, 9), f"{document.where}:{number}"
-            if len(words) < 10 or not all(map(_is_number, words[:9])):
+            if len(words) < 10 or not all(map(reads_as_number, words[:9])):
                 raise InputError(f"{where}: an image needs a number, a quaternion, a translation, a camera and a name")
             values = tuple(map(float, words[1:8]))
             found.append(Image(where, words[9].strip(), words[8], values[:4], values[4:]))
@@ -150,11 +151,3 @@ def _looks_binary(data: bytes) -> bool:
 def _lines(document: Document) -> list[str]:
     lines = (line.strip() for line in document.text[:100_000].splitlines())
     return [line for line in lines if line and not line.startswith("#")]
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -103,20 +103,20 @@ class Poses:
         """Say what was put right, and what was left out."""
         if self.mended:
             name, off = self.mended[0]
-            warnings.warn(
+            _say(
                 f"{name}: its rotation is off by {off:.2g}, as if rounded by hand{_others(self.mended)}: the nearest "
-                "rotation is taken",
-                UserWarning,
-                stacklevel=5,
+                "rotation is taken"
             )
         if self.lost:
             name, reason = self.lost[0]
-            warnings.warn(
+            _say(
                 f"{name}: {reason}{_others(self.lost)}: the lens is read and its pose left out (it is at the origin, "
-                "along +z); mend the file, or place it by with_pose, pose = in a scene file, or --eye and --target",
-                UserWarning,
-                stacklevel=5,
+                "along +z); mend the file, or place it by with_pose, pose = in a scene file, or --eye and --target"
             )
+
+
+def _say(text: str) -> None:
+    warnings.warn(text, UserWarning, stacklevel=6)
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from typing import Any
 from xml.etree import ElementTree
 
+from mpcam.checks import reads_as_number
 from mpcam.errors import InputError
 
 
@@ -27,7 +28,7 @@ def _value(element: ElementTree.Element) -> Any:
     if not children:
         text = (element.text or "").strip()
         words = text.split()
-        return words if len(words) > 1 and all(map(_is_number, words)) else text.strip('"')
+        return words if len(words) > 1 and all(map(reads_as_number, words)) else text.strip('"')
     if all(child.tag == "_" for child in children):
         return [_value(child) for child in children]
     found: dict[str, Any] = {}
@@ -38,11 +39,3 @@ def _value(element: ElementTree.Element) -> Any:
             value = found[key]
             found[key] = value if isinstance(value, list) else ([value] if value else [])
     return found
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

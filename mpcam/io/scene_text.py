@@ -210,4 +210,4 @@ def _described(kind: inspect.Type) -> str:
         return f"a table, of kind {' or '.join(_tags(kind))}"
     if isinstance(kind, inspect.UnionType):
         return " or ".join(_described(member) for member in kind.types)
-    raise NotImplementedError(f"scene tables use no {type(kind).__name__}")
+    return f"a value of the type {type(kind).__name__.removesuffix('Type').lower()}"  # of a camera of one's own

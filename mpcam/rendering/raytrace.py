@@ -110,7 +110,7 @@ class RayTraced(Moving):
         self._parameters: Any = None
         if len(faces) == 0:
             return
-        positions = in_frame(mesh.vertices, self._origin, self._unit)
+        positions = self._positions()
         with mitsuba() as mi:
             shape = mitsuba_mesh(mi, "mesh", dr.select(dr.isfinite(positions), positions, 0.0), faces)
             self._scene = mi.load_dict({"type": "scene", "mesh": shape})
@@ -131,7 +131,13 @@ class RayTraced(Moving):
             self._build()  # other faces may be finite now
             return
         with mitsuba() as mi:
-            move(self._parameters, self._key, mi.Float(in_frame(mesh.vertices, self._origin, self._unit)))
+            move(self._parameters, self._key, mi.Float(self._positions()))
+
+    def _positions(self) -> Any:
+        """The vertices around the origin: those on the device where that is the mesh's own anchor."""
+        if (self._origin == self.device.anchor).all() and self._unit == self.device.scale:
+            return self.device.vertices
+        return in_frame(self.mesh.vertices, self._origin, self._unit)
 
     @exclusive
     def frame(self) -> Hits:

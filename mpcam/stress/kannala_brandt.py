@@ -6,11 +6,10 @@ import numpy as np
 
 from mpcam.cameras.kannala_brandt import KannalaBrandt
 from mpcam.stress.distant import SIZE as VIEW
-from mpcam.stress.distant import distant_cases, focal_length, pose
+from mpcam.stress.distant import focal_length, pose
 from mpcam.stress.exact import Real, parameters
-from mpcam.stress.lenses import Definition, lens_cases
+from mpcam.stress.lenses import Definition, lens_suite
 from mpcam.stress.report import LIMIT as LIMIT
-from mpcam.stress.report import Progress, StressRow, check_counts, run_cases
 
 SIZE = 512
 
@@ -77,10 +76,4 @@ def narrow_view(distance: float, width: float) -> KannalaBrandt:
     return KannalaBrandt(VIEW, VIEW, focal, focal, VIEW / 2, VIEW / 2, (0.1, -0.05, 0.01, 0), pose(distance))
 
 
-def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
-    """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
-    check_counts(triangles=triangles, points=points)
-    cases = []
-    for name, camera in cameras().items():
-        cases += lens_cases(name, camera, definition(camera), points, triangles)
-    return run_cases([*cases, *distant_cases(narrow_view)], progress)
+run = lens_suite(cameras, definition, narrow_view)

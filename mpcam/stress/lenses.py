@@ -1,15 +1,16 @@
 """The cases of lenses that are symmetric about their axis, whatever their r = f(theta)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from mpcam.cameras.calibrated import FARTHEST
+from mpcam.stress.distant import Factory, distant_cases
 from mpcam.stress.exact import DIGITS, Exact, Parameter, Real, focal_lengths
 from mpcam.stress.inputs import central_points, pixels
 from mpcam.stress.projections import image_rows, ray_rows
 from mpcam.stress.regions import BoundOf, bound_rows
-from mpcam.stress.report import EPS, Case, StressRow
+from mpcam.stress.report import EPS, Case, Progress, StressRow, check_counts, run_cases
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,22 @@ def lens_cases(
         ]
 
     return [(name, projections), (f"{name}, bounds", lambda: bound_rows(name, camera, triangles, bounds))]
+
+
+def lens_suite(
+    cameras: Callable[[], Mapping[str, Any]], definition: Callable[[Any], Definition], narrow_view: Factory
+) -> Callable[..., list[StressRow]]:
+    """The `run` of the suite of a lens: all its cameras by name, each with its definition, and its distant eyes."""
+
+    def run(triangles: int = 30_000, points: int = 50, progress: Progress | None = None) -> list[StressRow]:
+        """All cases: `points` per kind of point, `triangles` per camera. Raises InputError below 1."""
+        check_counts(triangles=triangles, points=points)
+        cases: list[Case] = []
+        for name, camera in cameras().items():
+            cases += lens_cases(name, camera, definition(camera), points, triangles)
+        return run_cases([*cases, *distant_cases(narrow_view)], progress)
+
+    return run
 
 
 def end_of_domain(definition: Definition) -> End:
