@@ -69,6 +69,7 @@ class Reflector:
         normals = None if mesh.normals is None else usable_normals(mesh, faces, across)
         self.vertices, self.normals, self.faces = welded(places, group, faces, normals, self.usable)
         self.face_normals = Mesh(self.vertices, self.faces).face_normals
+        self.seen: tuple[Camera, FirstHits] | None = None  # by `pixel_hits`
 
     def at(
         self, face: np.ndarray, second: np.ndarray, third: np.ndarray, along: np.ndarray | None = None
@@ -223,12 +224,18 @@ def reflector_of(given: Mesh | Surface) -> Reflector:
 
 
 def pixel_hits(camera: Camera, reflector: Reflector) -> FirstHits:
-    """Where the rays of a camera's pixels, row by row, meet a reflector."""
-    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    ray = camera.ray(np.stack([u.ravel(), v.ravel()], -1))
-    valid = np.asarray(ray.valid)
-    found = reflector.first_hits(ray.origin, np.where(valid[:, None], ray.direction, (0.0, 0.0, 1.0)))
-    return found._replace(hit=found.hit & valid, distance=np.where(valid, found.distance, np.inf))
+    """Where the rays of a camera's pixels, row by row, meet a reflector.
+
+    Kept for the camera that came last: decomposing, pictures and their truth ask for the same.
+    """
+    if reflector.seen is None or reflector.seen[0] is not camera:
+        u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+        ray = camera.ray(np.stack([u.ravel(), v.ravel()], -1))
+        valid = np.asarray(ray.valid)
+        found = reflector.first_hits(ray.origin, np.where(valid[:, None], ray.direction, (0.0, 0.0, 1.0)))
+        found = found._replace(hit=found.hit & valid, distance=np.where(valid, found.distance, np.inf))
+        reflector.seen = camera, found
+    return reflector.seen[1]
 
 
 def _nearest_in(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.cameras.base import Camera
 from mpcam.checks import shown
-from mpcam.decomposition.reflector import Reflector
+from mpcam.decomposition.reflector import Reflector, pixel_hits
 from mpcam.errors import InputError
 
 SAMPLES = 60_000
@@ -111,14 +111,11 @@ def surface_samples(reflector: Reflector, count: int) -> tuple[np.ndarray, np.nd
 
 def _through_pixels(reflector: Reflector, camera: Camera, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (N, 3), normals (N, 3) and faces (N,) that pixels see; of every n-th where there are more than `most`."""
-    number = np.arange(0, camera.width * camera.height, -(-camera.width * camera.height // most))
-    v, u = np.divmod(number, camera.width)
-    ray = camera.ray(np.stack([u + 0.5, v + 0.5], axis=-1))
-    valid = np.asarray(ray.valid)
-    origin, along = np.asarray(ray.origin)[valid], np.asarray(ray.direction)[valid]
-    found = reflector.first_hits(origin, along)
-    points, normals = found.points[found.hit], found.normals[found.hit]
-    face = reflector.trace(origin[found.hit], along[found.hit])[0]
+    found = pixel_hits(camera, reflector)
+    step = -(-camera.width * camera.height // most)
+    hit = np.flatnonzero(found.hit[::step]) * step
+    points, normals, along = found.points[hit], found.normals[hit], found.along[hit]
+    face = reflector.trace(points - found.distance[hit, None] * along, along)[0]
     beside = face < 0  # the outline of the mesh lies within that of the surface
     face[beside] = reflector.closest(points[beside], normals[beside])[0]
     return points, normals, face

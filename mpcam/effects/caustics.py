@@ -27,7 +27,7 @@ from mpcam.effects.caustic_settings import Settings
 from mpcam.effects.shadows import shadow_map
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.moved import moved
+from mpcam.geometry.moved import begun_anew, moved
 from mpcam.geometry.surfaces import Surface
 from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
@@ -111,15 +111,8 @@ class Caustics:
         self._place_eye()
 
     def _place_eye(self) -> None:
-        whole, count = self.seen_scene.mesh, len(self._mesh.vertices)
-        if self._mesh is self.scene.mesh:
-            self._eye.move(whole)
-        else:
-            places, normals = whole.vertices.copy(), None if whole.normals is None else whole.normals.copy()
-            places[:count] = self._mesh.vertices
-            if normals is not None and self._mesh.normals is not None:
-                normals[:count] = self._mesh.normals
-            self._eye.move(moved(whole, places, normals))
+        whole = self.seen_scene.mesh
+        self._eye.move(whole if self._mesh is self.scene.mesh else begun_anew(whole, self._mesh))
         self._forget("hits", "_surface")
 
     @exclusive
@@ -127,10 +120,11 @@ class Caustics:
         """Receivers elsewhere: positions (V, 3) of the vertices of `scene.mesh`, or a list with one array for each of
         the scene's meshes, or a rigid transform; see `Moving.update`. Raises InputError as that does.
         """
-        self._mesh = moved(self.scene.mesh, vertices, normals, transform)
+        self._mesh, before = moved(self.scene.mesh, vertices, normals, transform), self._atlas.device
         self._atlas.move(self._mesh)
         self._shade.move(self._mesh)
-        self._rays = self.photons.on_device(self._atlas.device, self.scene.mesh.triangle_count)
+        if not self._atlas.device.same_frame(before):
+            self._rays = self.photons.on_device(self._atlas.device, self.scene.mesh.triangle_count)
         self._place_eye()
         self._forget()
 

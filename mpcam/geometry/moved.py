@@ -59,6 +59,21 @@ def moved(mesh: Mesh, vertices: Any = None, normals: Any = None, transform: Any 
     return _made(mesh, places, lambda: _after(mesh, places))
 
 
+def begun_anew(mesh: Mesh, first: Mesh) -> Mesh:
+    """The mesh with its first vertices, and their normals, where another mesh has them."""
+    count, places = len(first.vertices), np.array(mesh.vertices)
+    places[:count] = first.vertices
+
+    def normals() -> np.ndarray | None:
+        if mesh.normals is None:
+            return None
+        result = np.array(mesh.normals)
+        result[:count] = 0.0 if first.normals is None else first.normals
+        return result
+
+    return _made(mesh, places, normals)
+
+
 def _after(mesh: Mesh, vertices: np.ndarray) -> np.ndarray | None:
     """Shading normals of a mesh after its vertices moved."""
     if mesh.normals is None:

@@ -40,6 +40,10 @@ class DeviceMesh:
         self._ordered: Any = None
         self._near: DeviceMesh | None = None
 
+    def same_frame(self, other: "DeviceMesh") -> bool:
+        """Whether positions in both have the same anchor and scale."""
+        return self.scale == other.scale and bool((self.anchor == other.anchor).all())
+
     def used_of(self, mesh: Mesh) -> np.ndarray:
         """Those of the mesh's vertices that faces use."""
         return mesh.vertices if self.used is None else mesh.vertices[self.used]

@@ -52,7 +52,7 @@ class Moving:
         """The mesh as it is now, from `moved` of the one that was prepared."""
         before = self.device
         self._hold(mesh)
-        if before.scale != self.device.scale or (before.anchor != self.device.anchor).any():
+        if not self.device.same_frame(before):
             self._reframed()
 
     def _reframed(self) -> None:

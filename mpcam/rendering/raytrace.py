@@ -122,7 +122,7 @@ class RayTraced(Moving):
         """See `Moving.move`: uploads the vertices and rebuilds the tree."""
         before = self.device
         self._hold(mesh)
-        if before.scale != self.device.scale or (before.anchor != self.device.anchor).any():
+        if not self.device.same_frame(before):
             if self._given is None:
                 self._posed = self._own_rays()
             self._origin, self._unit = self._near(), self.device.scale
