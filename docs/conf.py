@@ -31,6 +31,13 @@ smartquotes = False
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", r"(numpy|np|collections|pathlib|os|typing|drjit|mitsuba)\..*")]
 nitpick_ignore = [("py:class", "ArrayLike")]
+# Names of annotations alone: what a number may be, and the settings of methods, which their own pages list.
+nitpick_ignore_regex += [
+    (
+        "py:class",
+        r"pi|[0-9.]+|mpcam\.(cameras\.(fields\.Limits|distortion\.Distortion|general_linear_kinds\.Line)|rendering\.registry\.\w+Settings)",
+    )
+]
 
 myst_enable_extensions = ["deflist", "dollarmath", "substitution"]
 myst_heading_anchors = 3

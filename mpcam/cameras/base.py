@@ -74,6 +74,8 @@ class Camera:
     images_per_point: ClassVar[int] = 1
     static_fields: ClassVar[tuple[str, ...]] = ("width", "height")
     """Fields that are part of the program rather than of the data (JAX, frozen kernels)."""
+    host_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that kernels do without, since others are derived from them."""
 
     @property
     def domain(self) -> Domain:

@@ -60,8 +60,10 @@ class Domain(NamedTuple):
 
     max_angle: largest angle between the optical axis and a ray, radians; None where rays have no common center.
     image_radius: radius in pixels of the image circle around the camera's (cx, cy), or the larger one of an ellipse;
-    None where the image goes on to infinity.
+    None where the image goes on to infinity. slit_depths: z in the camera frame at which images run to infinity, the
+    planes of slits and centers, of cameras whose image is not a disc.
     """
 
     max_angle: float | None
     image_radius: float | None
+    slit_depths: tuple[float, ...] = ()

@@ -51,7 +51,7 @@ def _numbers(camera: Camera) -> dict[str, Any]:
     """The fields that are data: all but the pose, what belongs to the program, words and what is left out."""
     names = [field.name for field in dataclasses.fields(camera)]  # pyright: ignore[reportArgumentType]
     values = ((name, getattr(camera, name)) for name in names)
-    fixed = (*camera.static_fields, "camera_from_world")
+    fixed = (*camera.static_fields, *camera.host_fields, "camera_from_world")
     return {n: value for n, value in values if n not in fixed and not isinstance(value, (str, type(None)))}
 
 
@@ -65,6 +65,12 @@ def unposed(camera: Camera) -> Camera:
         several = isinstance(value, tuple)
         object.__setattr__(result, name, tuple(next(on_device) for _ in value) if several else next(on_device))
     return result
+
+
+def on_device(camera: Camera) -> Camera:
+    """The camera as kernels take it: `unposed`, but for models that consist of tables, which are as they are."""
+    plain = all(np.ndim(value) == 0 for value in _numbers(camera).values() if not isinstance(value, tuple))
+    return unposed(camera) if plain else camera
 
 
 def _check_profile(profile: Any) -> None:
@@ -97,8 +103,7 @@ class DeviceCamera:
         _check_profile(getattr(camera, "profile", None))
         self.size: tuple[int, int] = (camera.width, camera.height)
         self.kept: dict[Any, Any] = {}
-        plain = all(np.ndim(value) == 0 for value in _numbers(camera).values() if not isinstance(value, tuple))
-        self.on_device = unposed(camera) if plain else camera
+        self.on_device = on_device(camera)
         self.central = camera.ray_geometry == "central"
         self.ray, self.anchor = pixel_rays(self.on_device)
 

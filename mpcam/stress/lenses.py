@@ -135,7 +135,7 @@ def domain_row(name: str, camera: Any, end: End) -> StressRow:
     with mpmath.workdps(DIGITS):
         radius = max(focal_lengths(camera)) * end.rim
         truths = ((end.limit, end.limit_condition), (radius, end.rim_condition))
-        for found, (truth, condition) in zip(domain, truths, strict=True):
+        for found, (truth, condition) in zip((domain.max_angle, domain.image_radius), truths, strict=True):
             if found is not None:
                 worst = max(worst, float(abs(mpmath.mpf(float(found)) / truth - 1) / (EPS["float64"] * condition)))
         wrong = int((domain.image_radius is None) != (end.rim > 0.9 * FARTHEST))

@@ -74,9 +74,9 @@ def rays(camera: Any, pixels: np.ndarray, precision: str) -> tuple[np.ndarray, .
 def _on_device(camera: Any, given: np.ndarray) -> tuple[Any, Any]:
     """The camera as kernels have it, and rows as vectors of theirs."""
     from mpcam.backend import opaque_zero, types
-    from mpcam.rendering.device_camera import unposed
+    from mpcam.rendering.device_camera import on_device
 
-    lens = camera if camera.ray_geometry == "general" else unposed(camera)
+    lens = on_device(camera)
     kind = getattr(types(), f"Array{given.shape[1]}f")
     # In Dr.Jit's own memory: kernels are compiled anew for NumPy's, by how it happens to be aligned.
     return lens, kind(*np.ascontiguousarray(given.T, np.float32)) + opaque_zero()
