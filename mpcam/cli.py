@@ -142,6 +142,7 @@ def render(
     shadows: bool = False,
     shadow_size: int | None = None,
     level: int | None = None,
+    patch: int | None = None,
     resolution: int | None = None,
     bound: str | None = None,
     cull: str | None = None,
@@ -156,13 +157,15 @@ def render(
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
-        method: invert, vertex, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment or raytrace.
+        method: invert, vertex, two_pass, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment or
+            raytrace.
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.
         shadows: Let the scene's lights cast shadows, by a shadow map each.
         shadow_size: Pixels along a side of those; 1024 if not given.
         level: Times that --method vertex halves each edge.
+        patch: Samples along a side of each triangle, for --method two_pass.
         resolution: Pixels along a face of --method cubemap and hemicube, or along the short sides of camera triangles.
         bound: tight, triangle or quad, for --method invert.
         cull: none, back or front: the side of triangles that --method invert does not show.
@@ -184,7 +187,14 @@ def render(
     check_machine()
     loaded = load(scene, size, view).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
-    asked = {"level": level, "resolution": resolution, "bound": bound, "cull": cull, "triangles": triangles}
+    asked = {
+        "level": level,
+        "patch": patch,
+        "resolution": resolution,
+        "bound": bound,
+        "cull": cull,
+        "triangles": triangles,
+    }
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     if loaded.mirror is not None:
         from mpcam.pictures.render import render as picture

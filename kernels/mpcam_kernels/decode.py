@@ -40,7 +40,8 @@ def weights(
     """
     hit = triangle >= 0
     corners = dr.gather(types.Array3u, faces, types.UInt(dr.maximum(triangle, 0)), hit)
-    points = [dr.gather(row, vertices, corner, hit).xyz for corner in corners]
-    shape = test.setup(*(points if pose is None else (placed(types, pose, point) for point in points)))
+    found = [dr.gather(row, vertices, corner, hit) for corner in corners]
+    points = [test.corner(row) if pose is None else placed(types, pose, row.xyz) for row in found]
+    shape = test.setup(*points)
     second, third = test.weights(shape, samples)
     return dr.select(hit, dr.clip(second, 0, 1), 0), dr.select(hit, dr.clip(third, 0, 1), 0)

@@ -38,8 +38,8 @@ class Pipeline:
 
     outline(camera, rows) gives the `PixelOutline`s of triangles, of which rows[corner][row] holds four numbers each;
     the first three of a corner's first row are its position. hidden(first) tells from the first rows where triangles
-    are surely not seen. test: module with setup, hit, inside, may_hit, pack and unpack. output: "hits", "depth" or
-    "coverage". cull: "none", or "back" or "front" to leave out the triangles that turn this side to the eye. bounded:
+    are surely not seen. test: module with corner, setup, hit, inside, may_hit, pack and unpack. output: "hits", "depth"
+    or "coverage". cull: "none", or "back" or "front" to leave out triangles that turn this side to the eye. bounded:
     test all pixels inside of the outlines and none outside, as papers count them; else, edges drop parts of blocks
     too. pieces: most outlines of a triangle. count: each frame also counts tests and hits. small: most pixels of a box
     that one thread walks.
@@ -150,7 +150,7 @@ class Pipeline:
         large = blocks.Large(rows[0], rows[1], dr.zeros(types.UInt, 1))
         corners = dr.gather(types.Array3u, faces, triangle)
         first = [dr.gather(types.Array4f, vertices[0], corner) for corner in corners]
-        points = [row.xyz for row in first]
+        points = [test.corner(row) for row in first]
         shown = ~self.hidden(first)
         if self.cull != "none":
             turn = test.turn(*points)

@@ -24,6 +24,11 @@ def _edge(p: Vector, q: Vector, flip: Any) -> tuple[Vector, Vector]:
     return low, dr.select(swap ^ flip, low - high, high - low)
 
 
+def corner(row: Any) -> Vector:
+    """What a set-up takes of a vertex's first row of four numbers."""
+    return row.xyz
+
+
 def turn(a: Vector, b: Vector, c: Vector) -> Float:
     """Below zero where corners run counter-clockwise in the image (v points down)."""
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)

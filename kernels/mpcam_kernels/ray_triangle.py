@@ -36,6 +36,11 @@ def _edge_normal(p: Vector, q: Vector) -> Vector:
     return dr.select(swap, -normal, normal)
 
 
+def corner(row: Any) -> Vector:
+    """What a set-up takes of a vertex's first row of four numbers."""
+    return row.xyz
+
+
 def turn(a: Vector, b: Vector, c: Vector) -> Float:
     """Below zero where corners run counter-clockwise seen from the eye."""
     return dr.dot(a, dr.cross(b - a, c - a))

@@ -7,6 +7,7 @@ from typing import Any
 
 from mpcam_kernels import pixel_triangle
 from mpcam_kernels.pixel_triangle import ROWS as ROWS
+from mpcam_kernels.pixel_triangle import corner as corner
 from mpcam_kernels.pixel_triangle import hit as hit
 from mpcam_kernels.pixel_triangle import inside as inside
 from mpcam_kernels.pixel_triangle import may_hit as may_hit

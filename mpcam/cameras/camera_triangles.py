@@ -7,6 +7,8 @@ import numpy as np
 
 from mpcam.cameras.atlas import Atlas, atlas
 from mpcam.cameras.base import Camera, register_pytrees
+from mpcam.cameras.general_linear_map import linear_numbers
+from mpcam.cameras.linear_pieces import LinearPieces
 from mpcam.cameras.types import Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, cross, dot, isfinite, library, normalize, plain, take, vector, where
@@ -136,13 +138,44 @@ class CameraTriangles(Camera):
 
     @property
     def images_per_triangle(self) -> int:
-        """Most images that a point has in one camera triangle: 3 (a cubic); 4 are looked for where rays are bent."""
-        return 3 if self.directions is not None else 4
+        """Most images that a point has in one camera triangle: 3 (a cubic), 1 where the camera is general linear; 4 are
+        looked for where rays are bent."""
+        return 1 if self.linear else 3 if self.directions is not None else 4
+
+    @property
+    def linear(self) -> bool:
+        """Whether each camera triangle is a general linear camera in its own plane: ray_scale "plane"."""
+        return self.directions is not None and self.ray_scale == "plane"
 
     @property
     def images_per_point(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Most images that a point has: image number n lies in camera triangle n // images_per_triangle."""
         return self.images_per_triangle * self.count
+
+    @property
+    def pieces(self) -> LinearPieces | None:
+        """Camera triangles that are general linear, each in a frame on its own plane; None where they are not."""
+        if not self.linear:
+            return None
+        places, rays = (np.stack([self.corners(i)[k] for i in range(3)]) for k in range(2))
+        first = places[0]
+        right, normal = normalize(places[1] - first), normalize(cross(places[1] - first, places[2] - first))
+        normal = where(dot(normal, rays[0]) < 0, -1.0, 1.0) * normal
+        axes = np.stack([right, cross(normal, right), normal])
+        frames = np.zeros((self.count, 4, 4))
+        frames[:, :3, :3], frames[:, 3, 3] = np.moveaxis(axes, -1, 0), 1.0
+        frames[:, :3, 3] = -np.einsum("ijn,jn->ni", axes, first)
+        starts, along = (np.einsum("ijn,kjn->kin", axes, part) for part in (places - first, rays))
+        generators = np.concatenate([along[:, :2] / along[:, 2:], starts[:, :2]], axis=1)
+        zero, face = np.zeros(self.count), np.arange(self.count)
+        corners = ((zero, zero), (zero + 1, zero), (zero, zero + 1))
+        image = np.stack([np.stack(self.atlas.pixel(face, *weights)) for weights in corners])
+        return LinearPieces.of(frames, linear_numbers(generators, image, 1, 1))
+
+    def locate(self, x: Array, y: Array) -> Array:
+        """Camera triangle of pixel positions; -1 for none."""
+        face, _, _, inside = self.atlas.locate(x, y)
+        return where(inside, face, -1)
 
     def corners(self, i: int) -> tuple[Vector, Vector]:
         """Positions of corner i of all camera triangles, and their rays (direct, scaled) or normals; each (3, F)."""

@@ -15,26 +15,21 @@ from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.general_linear_kinds import Kind, Line, classify
 from mpcam.cameras.general_linear_makers import CORNERS, Makers
 from mpcam.cameras.general_linear_map import LinearMap, linear_numbers
+from mpcam.cameras.linear_pieces import LinearPieces
 from mpcam.cameras.symmetric import finite_pixel
 from mpcam.cameras.types import Box, Domain, Projection, Ray
 from mpcam.errors import InputError
 from mpcam.math import (
     Array,
     Vector,
-    absolute,
-    detach,
-    epsilon,
-    isfinite,
     library,
-    norm,
     normalize,
     rotate_back,
     vector,
-    where,
+    whole,
 )
 
 _FLAT = 1e-9  # of the area of generators in the image over the square of their distances; below, they lie on a line
-_UNSURE = 4.0  # roundings of the determinant that a point's image has to be sure of
 
 Generator = tuple[float, float, float, float]
 Place = tuple[float, float]
@@ -72,16 +67,12 @@ class GeneralLinear(Makers, Camera):
         if library(self.rays, self.image) == "numpy":
             if self.image is None and _area(self.rays[:, 2:]) <= _FLAT:
                 set_(self, "image", _table(CORNERS, "image", 2))
-            if _area(self._places()) <= _FLAT:
+            if _area(self.places) <= _FLAT:
                 raise InputError(
                     f"GeneralLinear(image={np.asarray(self.image).tolist()}): the three places lie on one line: give "
                     "three corners of a triangle"
                 )
-            set_(
-                self,
-                "linear",
-                tuple(float(x) for x in linear_numbers(self.rays, self._places(), self.width, self.height)),
-            )
+            set_(self, "linear", tuple(float(x) for x in self._numbers()))
         register_pytrees()
 
     @property
@@ -141,51 +132,43 @@ class GeneralLinear(Makers, Camera):
         pose = np.asarray(self.camera_from_world, np.float64)
         return Line((point - pose[:3, 3]) @ pose[:3, :3], np.asarray(rotate_back(pose, direction)))
 
-    def _places(self) -> Any:
+    @property
+    def places(self) -> Any:
         """Where the generators lie in the image, in widths and heights."""
         return self.rays[:, 2:] if self.image is None else self.image
 
-    def _map(self) -> LinearMap:
-        numbers = (
-            linear_numbers(self.rays, self._places(), self.width, self.height) if self.linear is None else self.linear
-        )
-        return LinearMap(*numbers)
+    @property
+    def map(self) -> LinearMap:
+        """sigma, tau, u and v as functions of the pixel, in the camera frame."""
+        return LinearMap(*(self._numbers() if self.linear is None else self.linear))
+
+    @property
+    def pieces(self) -> LinearPieces:
+        """The camera as the only piece of itself."""
+        return LinearPieces.of(np.eye(4)[None], [np.full(1, float(number)) for number in self.map])
+
+    def locate(self, x: Array, y: Array) -> Array:
+        """Piece of pixel positions."""
+        return whole(0.0 * (x + y))
+
+    def _numbers(self) -> list[Array]:
+        return linear_numbers(self.rays, self.places, self.width, self.height)
 
     def local_ray(self, pixel: Vector) -> Ray:
         """Ray of a pixel in the camera frame."""
         x, y, valid = finite_pixel(pixel)
-        sigma, tau, u, v = self._map().at(x, y)
+        sigma, tau, u, v = self.map.at(x, y)
         zero = 0.0 * x
         return Ray(vector(u + zero, v + zero, zero), normalize(vector(sigma + zero, tau + zero, zero + 1.0)), valid)
 
     def local_project(self, point: Vector) -> tuple[Projection, ...]:
-        """The image of a point in the camera frame: two linear equations in the plane of its depth (Yu et al. 2009,
-        eq. 5). Valid from z = 0 on, but in planes of slits, where rounding decides about the image, or there is none.
-        """
-        x, y, z = point
-        valid = (z >= 0) & isfinite(x) & isfinite(y) & isfinite(z)
-        x, y, z = (where(valid, part, 1.0) for part in (x, y, z))
-        linear = self._map()
-        (a, b), (c, d), (right, below) = linear.equations(x, y, z)
-        determinant = a * d - b * c
-        sure = absolute(determinant) > _UNSURE * epsilon(x) * self._doubt(linear, z, a, b, c, d)
-        inverse = 1.0 / where(sure, determinant, 1.0)
-        px, py = (d * right - b * below) * inverse, (a * below - c * right) * inverse
-        sure = sure & valid & isfinite(px) & isfinite(py)
-        px, py = where(sure, px, 0.0), where(sure, py, 0.0)
-        sigma, tau, _, _ = linear.at(px, py)
-        depth = where(sure, z * norm(vector(sigma, tau, 1.0 + 0.0 * sigma)), 0.0)
-        return (Projection(vector(px, py), depth, sure),)
-
-    @staticmethod
-    def _doubt(linear: LinearMap, z: Array, *entries: Array) -> Array:
-        """What one rounding of each entry of the equations can change in their determinant."""
-        (a, b, c, d), sizes = (absolute(detach(entry)) for entry in entries), linear.sizes(detach(z))
-        return sizes[0] * d + a * sizes[3] + sizes[1] * c + b * sizes[2]
+        """The image of a point in the camera frame: see `LinearMap.solve`."""
+        linear = self.map
+        return (linear.solve(linear.coefficients(point)),)
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
         """Box of the part of a triangle with z >= 0, cut at the planes of slits."""
-        return general_linear_bounds.box(self._map(), a, b, c)
+        return general_linear_bounds.box(self.map, a, b, c)
 
     def __repr__(self) -> str:
         return f"GeneralLinear({self.width}x{self.height}, {self.kind})"

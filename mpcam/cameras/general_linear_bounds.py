@@ -5,15 +5,14 @@ denominator of one sign. Over the convex hull of some points, such a ratio is a 
 (its polar forms), so that the smallest and the largest of these hold it.
 """
 
-from mpcam.cameras.general_linear_map import LinearMap
+from mpcam.cameras.general_linear_map import BEYOND, LinearMap
 from mpcam.cameras.types import Box
-from mpcam.math import Array, Vector, absolute, epsilon, isfinite, maximum, minimum, sqrt, vector, where
+from mpcam.math import Array, Vector, absolute, epsilon, isfinite, maximum, minimum, vector, where
 
 FAR = 1e9
 """Pixels; stands for infinity in boxes, so that no arithmetic on boxes makes NaN."""
 
 _SLACK = 16.0  # roundings that the sign of a denominator, or of a numerator over a slit, has to be sure of
-_BEYOND = 1e30  # a depth that no triangle reaches
 
 
 def box(linear: LinearMap, a: Vector, b: Vector, c: Vector) -> Box:
@@ -21,8 +20,8 @@ def box(linear: LinearMap, a: Vector, b: Vector, c: Vector) -> Box:
     finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
     a, b, c = (vector(*(where(finite, corner[i], 1.0) for i in range(3))) for corner in (a, b, c))
     zero = 0.0 * a[2]
-    first, second = _slits(linear, zero)
-    ends = [(zero, first), (first, second), (second, zero + _BEYOND)]
+    first, second = (zero + z for z in linear.slits())
+    ends = [(zero, first), (first, second), (second, zero + BEYOND)]
     low, high, valid = [zero + FAR, zero + FAR], [zero - FAR, zero - FAR], finite & (zero > 1.0)
     for near, far in ends:
         seen = (maximum(maximum(a[2], b[2]), c[2]) >= near) & (minimum(minimum(a[2], b[2]), c[2]) <= far) & (far > near)
@@ -33,27 +32,6 @@ def box(linear: LinearMap, a: Vector, b: Vector, c: Vector) -> Box:
         valid = valid | (finite & seen)
     bounded = [maximum(minimum(side, FAR), -FAR) for side in (*low, *high)]
     return Box(vector(*bounded[:2]), vector(*bounded[2:]), valid)
-
-
-def _slits(linear: LinearMap, zero: Array) -> tuple[Array, Array]:
-    """Depths of the slits that lie before the plane z = 0, rising; where there is none, a depth that nothing has."""
-    A = zero + (linear.sigma_x * linear.tau_y - linear.sigma_y * linear.tau_x)
-    C = zero + (linear.u_x * linear.v_y - linear.u_y * linear.v_x)
-    B = zero + (
-        linear.u_x * linear.tau_y
-        + linear.sigma_x * linear.v_y
-        - linear.u_y * linear.tau_x
-        - linear.sigma_y * linear.v_x
-    )
-    discriminant = B * B - 4.0 * A * C
-    real = discriminant >= 0
-    root = sqrt(where(real, discriminant, 0.0))
-    q = -0.5 * (B + where(B < 0, -root, root))
-    found = []
-    for top, bottom in ((q, A), (C, q)):
-        z = top / where(bottom != 0, bottom, 1.0)
-        found.append(where(real & (bottom != 0) & (z > 0) & (z < _BEYOND), z, _BEYOND))
-    return minimum(*found), maximum(*found)
 
 
 def _between(
@@ -96,7 +74,7 @@ class _Terms:
     """The entries of the equations for a point, from which ratios for pairs of points are made."""
 
     def __init__(self, linear: LinearMap, point: Vector):
-        (self.a, self.b), (self.c, self.d), (self.right, self.below) = linear.equations(*point)
+        self.a, self.b, self.c, self.d, self.right, self.below, _ = linear.coefficients(point)
         z = absolute(point[2])
         self.sizes = linear.sizes(z)
         self.ends = [

@@ -21,6 +21,7 @@ from mpcam.cameras.scaramuzza import Scaramuzza as Scaramuzza
 from mpcam.cameras.field_of_view import FieldOfView as FieldOfView
 from mpcam.cameras.panorama import Panorama as Panorama
 from mpcam.cameras.general_linear import GeneralLinear as GeneralLinear
+from mpcam.cameras.general_linears import GeneralLinears as GeneralLinears
 from mpcam.cameras.ray_map import RayMap as RayMap
 from mpcam.cameras.camera_triangles import CameraTriangles as CameraTriangles
 # isort: on

@@ -70,7 +70,7 @@ def compare(
     mesh = scene.mesh
     if scene.mirror is not None:
         return _mirrored(scene, camera, mirror_plan(methods, settings), repeats, output, progress, shading, moving)
-    plan = make_plan(mesh.triangle_count, methods, settings)
+    plan = make_plan(mesh.triangle_count, methods, settings, camera)
     each = 1 + (1 + WARMUP + repeats) * (3 if moving else 2)
     steps = StepCounter(progress, 2 + len(plan) * each)
 

@@ -50,14 +50,17 @@ def make_plan(
     triangles: int,
     methods: Iterable[str] | None = None,
     settings: Mapping[str, Sequence[Mapping[str, Any] | float]] | None = None,
+    camera: Any = None,
 ) -> list[Choice]:
     """Choose methods and settings for a mesh of so many triangles; whether a camera suits them, `prepare` knows.
 
-    methods: names out of `mpcam.rendering.registry.METHODS`; None for all. settings: method -> list of settings, each a
+    methods: names out of `mpcam.rendering.registry.METHODS`; None for those that are usual
+    for the camera. settings: method -> list of settings, each a
     mapping for `prepare` or the bare number of the method's parameter, e.g. {"vertex": [0, 3], "invert": [{"bound":
     "tight"}]}; methods that it does not name keep theirs. Raises `InputError` for names that do not exist.
     """
-    names = list(METHODS) if methods is None else list(dict.fromkeys(_named(methods)))
+    usual = [name for name, method in METHODS.items() if method.usual(camera)]
+    names = usual if methods is None else list(dict.fromkeys(_named(methods)))
     settings = dict(settings or {})
     for name in (*names, *settings):
         if name not in METHODS:

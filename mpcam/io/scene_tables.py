@@ -102,18 +102,23 @@ class SizesTable(Table, frozen=True):
     sizes: Annotated[list[Annotated[int, Meta(ge=8, le=16384)]], Meta(min_length=1)]
 
 
-Method = Literal["invert", "vertex", "cubemap", "hemicube", "raytrace", "camera_triangles", "environment"]
+class PatchesTable(Table, frozen=True):
+    patches: Annotated[list[Annotated[int, Meta(ge=2, le=256)]], Meta(min_length=1)]
+
+
+Method = Literal["invert", "vertex", "two_pass", "cubemap", "hemicube", "raytrace", "camera_triangles", "environment"]
 
 
 class CompareTable(Table, frozen=True):
     """[compare]: what `mpcam compare` runs; a key that is left out is chosen there.
 
     Scenes with a mirror are compared by camera_triangles, vertex, environment and raytrace, others by invert,
-    vertex, cubemap, hemicube and raytrace.
+    vertex, two_pass, cubemap, hemicube and raytrace.
     """
 
     methods: Annotated[list[Method], Meta(min_length=1)] | None = None
     vertex: LevelsTable | None = None
+    two_pass: PatchesTable | None = None
     cubemap: ResolutionsTable | None = None
     hemicube: ResolutionsTable | None = None
     camera_triangles: TrianglesTable | None = None

@@ -103,6 +103,7 @@ def _compare(table: CompareTable, text: SceneText) -> CompareSettings:
     settings: dict[str, tuple[dict[str, Any], ...]] = {}
     for method, key, parameter in (
         ("vertex", "levels", "level"),
+        ("two_pass", "patches", "patch"),
         ("cubemap", "resolutions", "resolution"),
         ("hemicube", "resolutions", "resolution"),
         ("camera_triangles", "triangles", "triangles"),

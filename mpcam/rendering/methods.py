@@ -9,7 +9,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits
 from mpcam.rendering.maps import OUTPUTS, CoverageMap, DepthMap
-from mpcam.rendering.registry import METHODS, CubemapSettings, InvertSettings, VertexSettings
+from mpcam.rendering.registry import METHODS, CubemapSettings, InvertSettings, TwoPassSettings, VertexSettings
 from mpcam.scene.scene import Scene
 
 Output = Literal["hits", "depth", "coverage"]
@@ -64,6 +64,12 @@ def prepare(
 
 @overload
 def prepare(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["two_pass"], **settings: Unpack[TwoPassSettings]
+) -> Prepared: ...
+
+
+@overload
+def prepare(
     camera: Camera, mesh: Mesh | Scene, method: Literal["cubemap", "hemicube"], **settings: Unpack[CubemapSettings]
 ) -> Prepared: ...
 
@@ -83,8 +89,9 @@ def prepare(
     CoverageMap). settings: for invert `bound` ("tight", "triangle" or "quad"; for cameras that give nothing but rays
     "tight", and for camera triangles "triangle" or "nine_point"), `cull` ("none", "back" or "front": the side of
     triangles that is not shown; corners run counter-clockwise in front), and where there is nothing but rays `culling`
-    (see `GeneralRasterizer`); `level` (0 to 7) for vertex; `resolution` (pixels per face) for cubemap and hemicube;
-    none for raytrace. Raises InputError for unknown methods and settings, and where a camera lacks what a method needs.
+    (see `GeneralRasterizer`); `level` (0 to 7) for vertex; `patch` (2 to 256, samples along a side of a triangle) for
+    two_pass; `resolution` (pixels per face) for cubemap and hemicube; none for raytrace. Raises InputError for unknown
+    methods and settings, and where a camera lacks what a method needs.
     """
     if not isinstance(camera, Camera):
         raise InputError(
@@ -129,6 +136,12 @@ def rasterize(
 
 @overload
 def rasterize(
+    camera: Camera, mesh: Mesh | Scene, method: Literal["two_pass"], **settings: Unpack[TwoPassSettings]
+) -> Hits: ...
+
+
+@overload
+def rasterize(
     camera: Camera, mesh: Mesh | Scene, method: Literal["cubemap", "hemicube"], **settings: Unpack[CubemapSettings]
 ) -> Hits: ...
 
@@ -142,8 +155,9 @@ def rasterize(camera: Camera, mesh: Mesh | Scene, method: str = "invert", **sett
 
     camera: any of mpcam's cameras, or one of your own. mesh: a Mesh, or a Scene (its meshes as one). method: "invert"
     (exact: bounds each curved triangle and inverts per pixel), "vertex" (projected vertices, straight edges),
-    "cubemap", "hemicube" (resampled linear views), "raytrace" (Mitsuba). settings: see `prepare`. Returns Hits with
-    triangle (H, W), barycentric (H, W, 2), depth (H, W); fields that are not asked for cost nothing. Raises InputError.
+    "two_pass" (patches of samples, drawn as small triangles), "cubemap", "hemicube" (resampled linear views),
+    "raytrace" (Mitsuba). settings: see `prepare`. Returns Hits with triangle (H, W), barycentric (H, W, 2),
+    depth (H, W); fields that are not asked for cost nothing. Raises InputError.
     """
     return prepare(camera, mesh, method, **settings).frame()
 

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict, get_args
 
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Images, Outlines
+from mpcam.cameras.linear_pieces import linear_pieces
 
 Cull = Literal["none", "back", "front"]
 Culling = Literal["objects", "triangles"]
@@ -47,6 +48,12 @@ class VertexSettings(TypedDict, total=False):
     level: int
 
 
+class TwoPassSettings(TypedDict, total=False):
+    """patch: samples along each side of a triangle, 2 to 256."""
+
+    patch: int
+
+
 class CubemapSettings(TypedDict, total=False):
     """resolution: pixels along the sides of a face, 1 to 16384."""
 
@@ -80,7 +87,8 @@ class Method:
     """A method of rasterizing, or of showing a mirror.
 
     home: for a camera. outputs: what frames may hold. knob: the setting that trades time for error, and the values of
-    it that comparisons try; None where there is none. style: color and marker in plots.
+    it that comparisons try; None where there is none. style: color and marker in plots. usual: whether comparisons try
+    it for a camera without being asked.
     """
 
     home: Callable[[Camera], Home]
@@ -88,6 +96,7 @@ class Method:
     knob: str | None = None
     values: tuple[int, ...] = ()
     style: tuple[str, str] = ("#8a6d00", "P")
+    usual: Callable[[Camera], bool] = lambda camera: True
 
 
 def outlined(camera: Camera) -> bool:
@@ -118,6 +127,13 @@ METHODS: dict[str, Method] = {
         knob="level",
         values=(0, 1, 2, 3, 4),
         style=("#c2560b", "^"),
+    ),
+    "two_pass": Method(
+        home("mpcam.rendering.two_pass:TwoPass", TwoPassSettings),
+        knob="patch",
+        values=(5, 10, 20),
+        style=("#b0306a", "v"),
+        usual=lambda camera: linear_pieces(camera) is not None,
     ),
     "cubemap": Method(
         home("mpcam.rendering.cubemap:Cubemapped", CubemapSettings),

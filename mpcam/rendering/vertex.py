@@ -157,7 +157,7 @@ class Subdivision:
         """Vertex numbers of all parts of all triangles."""
         import drjit as dr
 
-        if self.count == 1 or triangles == 0:
+        if self.count == 1 or triangles == 0:  # the whole triangles themselves
             return faces
         number = dr.arange(types().UInt, 3 * self.count * triangles)
         offset = (number // (3 * self.count)) * self.points

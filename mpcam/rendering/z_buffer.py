@@ -223,16 +223,16 @@ class ZBuffered(Moving):
 
     def _hits(self, positions: list[Any], small: Any, depth: Any) -> Hits:
         width, faces, samples = self.camera.width, self.faces, self.samples.pixels
-        triangle = self.parent(small)
+        triangle, nothing = self.parent(small), self.triangle_count == 0
 
         def weights() -> tuple[Any, Any]:
-            if self.mesh.triangle_count == 0:
+            if nothing:
                 return depth * 0.0, depth * 0.0
             found = _frozen_weights(self.test, width)(self.pixels, small, positions[0], faces, samples)
             return self.parent_weights(small, *found)
 
         def stats() -> Stats:
-            if self.mesh.triangle_count == 0:
+            if nothing:
                 return Stats(0, 0)
             tests, rendered = self.count(positions)
             return Stats(int(tests), int(rendered))
