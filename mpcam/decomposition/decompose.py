@@ -1,6 +1,7 @@
 """From a curved mirror or lens to camera triangles (Hou et al. 2006, section 2.3)."""
 
 import dataclasses
+import warnings
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,18 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import whole_number
 from mpcam.decomposition.coarse import Coarse, Coarsening
 from mpcam.decomposition.reflector import Reflector, reflector_of
+from mpcam.decomposition.shared_lengths import slants, with_shared_lengths
 from mpcam.decomposition.shooting import Locator, shoot
 from mpcam.decomposition.views import SLACK, SeenPoints, on_mesh, view_of
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
-MODES = ("normals", "directions")
+MODES = ("normals", "directions", "general_linear", "continuous")
 MOST = 100_000
 """Camera triangles at most."""
+_GRAZING = 1e-6
+"""Least part of a unit ray along the normal of its triangle's plane."""
 _TRIES = 6
 _INNER = np.array(
     [
@@ -49,7 +53,10 @@ def decompose(
     mesh of fewer triangles is taken as it is, which is exact; where the shape needs more to stay whole (a closed
     surface has 4, some of them seen), there are more. resolution: pixels along the short sides of each triangle in the
     atlas. index: refractive index behind the surface over that on the eye's side, None for a mirror. mode: "normals"
-    bends the rays pixel by pixel, "directions" only at the vertices (the direct camera, for comparison).
+    bends the rays pixel by pixel; the others only at the vertices. "directions": unit directions in between (Hou et al.
+    2006); "general_linear": each triangle a general linear camera in its own plane (Yu et al. 2009, section 5.2), with
+    one image of a point but seams between neighbors; "continuous": lengths shared by all triangles around a vertex, so
+    that each is as nearly general linear as it can be, without a seam (see `shared_lengths`).
 
     Vertices lie on the true surface and have its normals. Both sides of the surface count. Returns CameraTriangles in
     the world frame. Raises InputError for an eye that sees nothing of the reflector or lies on it, and for other
@@ -64,7 +71,12 @@ def decompose(
     cams = CameraTriangles(
         coarse.vertices, coarse.faces, normals=coarse.normals, eye=view.eye, resolution=resolution, index=index
     )
-    return cams if mode == "normals" else directions_at_vertices(cams)
+    if mode == "normals":
+        return cams
+    direct = directions_at_vertices(cams)
+    if mode == "general_linear":
+        return in_own_planes(direct)
+    return direct if mode == "directions" else with_shared_lengths(direct)
 
 
 def directions_at_vertices(cams: CameraTriangles) -> CameraTriangles:
@@ -81,6 +93,27 @@ def directions_at_vertices(cams: CameraTriangles) -> CameraTriangles:
             "then have no ray: use mode='normals', or another index"
         )
     return dataclasses.replace(cams, directions=ways.T, normals=None, eye=None, index=None)
+
+
+def in_own_planes(cams: CameraTriangles) -> CameraTriangles:
+    """The same rays at the vertices, each camera triangle general linear in its own plane (ray_scale "plane").
+
+    Camera triangles whose rays do not all leave on one side of their plane, at grazing incidence, are none, and are
+    left out with a warning. Raises InputError where there are no directions, or no triangle is left.
+    """
+    slant = slants(cams)
+    kept = (slant > _GRAZING).all(axis=0) | (slant < -_GRAZING).all(axis=0)
+    if not kept.any():
+        raise InputError("in_own_planes: no camera triangle has rays that all leave on one side of its plane")
+    if not kept.all():
+        warnings.warn(
+            f"{cams.count - int(kept.sum())} of {cams.count} camera triangles are left out: their rays do not all leave on one "
+            "side of their plane, so that they are no general linear cameras there",
+            stacklevel=3,
+        )
+    sides = np.asarray(cams.resolution)
+    sides = sides[kept] if sides.ndim else cams.resolution
+    return dataclasses.replace(cams, faces=cams.faces[kept], resolution=sides, ray_scale="plane")
 
 
 def subdivided(
