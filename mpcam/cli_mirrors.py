@@ -17,7 +17,7 @@ def decompose(
     eye: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     triangles: int | None = None,
     resolution: int | None = None,
-    directions: bool = False,
+    mode: str | None = None,
     json: bool = False,
 ) -> None:
     """Cut the scene's mirror into camera triangles, write them as a camera in JSON, and say how far their rays are off.
@@ -28,7 +28,8 @@ def decompose(
         eye: Point x,y,z that looks into the mirror; the scene's camera if not given.
         triangles: How many at most; those of the scene's mirror, or 104.
         resolution: Pixels along the short sides of each; those of the scene's mirror, or 64.
-        directions: Bend rays at the vertices only.
+        mode: normals bends rays at each pixel; directions, general_linear and continuous at the vertices only. If not
+            given, that of the scene's mirror, or normals.
         json: Print the errors as JSON.
     """
     from dataclasses import asdict
@@ -50,7 +51,7 @@ def decompose(
         triangles or mirror.triangles,
         resolution=resolution or mirror.resolution,
         index=mirror.index,
-        mode="directions" if directions else "normals",
+        mode=mode or mirror.mode,
     )
     found = ray_error(cams, mirror.surface, seen)
     with atomic_path(output) as file:

@@ -107,8 +107,8 @@ def in_own_planes(cams: CameraTriangles) -> CameraTriangles:
         raise InputError("in_own_planes: no camera triangle has rays that all leave on one side of its plane")
     if not kept.all():
         warnings.warn(
-            f"{cams.count - int(kept.sum())} of {cams.count} camera triangles are left out: their rays do not all leave on one "
-            "side of their plane, so that they are no general linear cameras there",
+            f"{cams.count - int(kept.sum())} of {cams.count} camera triangles are left out: their rays do not "
+            "all leave on one side of their plane, so that they are no general linear cameras there",
             stacklevel=3,
         )
     sides = np.asarray(cams.resolution)

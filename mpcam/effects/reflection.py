@@ -93,12 +93,13 @@ class Reflection:
         """What the method shows in the mirror."""
         camera, mesh, mirror = self.camera, self.scene.mesh, self.mirror
 
-        def decomposed(side: int) -> CameraTriangles:
+        def decomposed(side: int, mode: str = "normals") -> CameraTriangles:
             many = mirror.triangles if triangles is None else triangles
-            return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index)
+            return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index, mode=mode)
 
         if self.method == "camera_triangles":
-            found = decomposed(mirror.resolution if resolution is None else resolution) if cams is None else cams
+            side = mirror.resolution if resolution is None else resolution
+            found = decomposed(side, mirror.mode) if cams is None else cams
             return ByTriangles(camera, mesh, mirror.surface, found, self.shaded)
         if self.method == "vertex":
             found = decomposed(2) if cams is None else cams

@@ -22,9 +22,8 @@ def build_mirror(table: MirrorTable, folder: Path, text: SceneText) -> Mirror:
     place = placement(table.scale, table.rotate, table.translate, ("mirror",), text)
     surface = _surface(table, place, text) if kinds == ["surface"] else _mesh(table, place, folder, text)
     with text.at("mirror"):
-        return Mirror(
-            surface, table.index, color(table.color, text, "mirror", "color"), table.triangles, table.resolution
-        )
+        tint = color(table.color, text, "mirror", "color")
+        return Mirror(surface, table.index, tint, table.triangles, table.resolution, table.mode)
 
 
 def _surface(table: MirrorTable, place: Any, text: SceneText) -> Surface:

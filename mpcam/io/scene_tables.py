@@ -63,6 +63,7 @@ class MirrorTable(Table, frozen=True):
     color: Color = 1.0
     triangles: Annotated[int, Meta(ge=1, le=100000)] = 104  # camera triangles
     resolution: Annotated[int, Meta(ge=2, le=8192)] = 64  # pixels along the short sides of each
+    mode: Literal["normals", "directions", "general_linear", "continuous"] = "normals"  # how rays run within each
 
 
 class EnvironmentTable(Table, frozen=True):

@@ -18,7 +18,8 @@ class Mirror:
     surface: a Mesh (smooth unless it has facets' normals) or a Surface. index: None for a mirror; else the refractive
     index behind the surface over that on the camera's side, and the scene is seen through it. color: linear RGB, what
     is seen is multiplied by it. triangles, resolution: the camera triangles that stand for it, and pixels along the
-    short sides of each. Raises InputError for a field of the wrong kind.
+    short sides of each. mode: how rays run between their vertices, see `mpcam.decompose`. Raises InputError for a field
+    of the wrong kind.
     """
 
     surface: Any
@@ -26,6 +27,7 @@ class Mirror:
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     triangles: int = 104
     resolution: int = 64
+    mode: str = "normals"
 
     def __post_init__(self) -> None:
         if not isinstance(self.surface, (Mesh, Surface)):

@@ -1,0 +1,78 @@
+"""Images in camera triangles that are nearly general linear: the closed form as a start, then Newton's steps.
+
+Where ray lengths are shared around vertices so that directions have nearly the same part along each triangle's normal,
+the one image of the general linear camera with these rays lies near the image that the continuous camera has. Two steps
+on both weights and the distance together end there, without a cubic.
+"""
+
+from typing import Any, NamedTuple
+
+from mpcam.cameras.hulls import minus
+from mpcam.math import Array, Vector, absolute, cross, dot, epsilon, isfinite, norm, vector, where
+
+
+class NearImage(NamedTuple):
+    """Weights of corners 2 and 3, distance along the mixed ray in units of its length, and |p + c D - q|.
+
+    residual: relative to the distances that it is made of; infinite where there is no start.
+    """
+
+    second: Array
+    third: Array
+    c: Array
+    residual: Array
+
+
+def near_image(places: Any, rays: Any, point: Vector, steps: int = 2) -> NearImage:
+    """The image of a point (scene units) in camera triangles with corners and rays (three vectors each).
+
+    The start is exact where all rays have the same part along the normal (Yu et al. 2009, eq. 5). Where the residual is
+    not small, ask `three_rays.project`, which finds all images.
+    """
+    a, b, c = places
+    normal = cross(minus(b, a), minus(c, a))
+    parts = [dot(normal, ray) for ray in rays]
+    mean = (parts[0] + parts[1] + parts[2]) * (1.0 / 3.0)
+    usable = (parts[0] * parts[1] > 0) & (parts[1] * parts[2] > 0)
+    height = dot(normal, minus(point, a))
+    p, q, r = (
+        vector(*(place[i] + height / where(usable, part, 1.0) * ray[i] for i in range(3)))
+        for place, ray, part in zip(places, rays, parts, strict=True)
+    )
+    right, down, back = minus(q, p), minus(r, p), minus(p, point)
+    area = dot(normal, cross(right, down))
+    usable = usable & (absolute(area) > 16.0 * epsilon(area) * norm(normal) * norm(right) * norm(down))
+    inverse = 1.0 / where(usable, area, 1.0)
+    second, third = dot(normal, cross(down, back)) * inverse, -dot(normal, cross(right, back)) * inverse
+    distance = height / where(mean != 0, mean, 1.0)
+    sides = minus(b, a), minus(c, a)
+    turns = minus(rays[1], rays[0]), minus(rays[2], rays[0])
+    for _ in range(steps):
+        along, gap, _ = _miss(a, rays[0], sides, turns, point, second, third, distance)
+        columns = [
+            vector(*(side[i] + distance * turn[i] for i in range(3))) for side, turn in zip(sides, turns, strict=True)
+        ]
+        volume = dot(cross(columns[0], columns[1]), along)
+        size = norm(columns[0]) * norm(columns[1]) * norm(along)
+        regular = absolute(volume) > 16.0 * epsilon(volume) * size
+        inverse = where(regular, -1.0, 0.0) / where(regular, volume, 1.0)
+        second, third, distance = (
+            second + dot(cross(gap, columns[1]), along) * inverse,
+            third + dot(cross(columns[0], gap), along) * inverse,
+            distance + dot(cross(columns[0], columns[1]), gap) * inverse,
+        )
+    along, gap, size = _miss(a, rays[0], sides, turns, point, second, third, distance)
+    residual = norm(gap) / size
+    sound = usable & isfinite(residual)
+    return NearImage(second, third, distance, where(sound, residual, float("inf")))
+
+
+def _miss(
+    first: Vector, ray: Vector, sides: Any, turns: Any, point: Vector, second: Array, third: Array, distance: Array
+) -> tuple[Vector, Vector, Array]:
+    """Mixed direction, p + c D - q, and the distances that it is made of."""
+    along = vector(*(ray[i] + second * turns[0][i] + third * turns[1][i] for i in range(3)))
+    origin = vector(*(first[i] + second * sides[0][i] + third * sides[1][i] for i in range(3)))
+    reach = minus(point, origin)
+    gap = vector(*(distance * along[i] - reach[i] for i in range(3)))
+    return along, gap, norm(reach) + norm(sides[0]) + norm(sides[1])
