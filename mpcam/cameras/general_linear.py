@@ -15,6 +15,7 @@ from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.general_linear_kinds import Kind, Line, classify
 from mpcam.cameras.general_linear_makers import CORNERS, Makers
 from mpcam.cameras.general_linear_map import LinearMap, linear_numbers
+from mpcam.cameras.general_linear_tables import LinearTable
 from mpcam.cameras.linear_pieces import LinearPieces
 from mpcam.cameras.symmetric import finite_pixel
 from mpcam.cameras.types import Box, Domain, Projection, Ray
@@ -36,7 +37,7 @@ Place = tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class GeneralLinear(Makers, Camera):
+class GeneralLinear(Makers, LinearTable, Camera):
     """The affine combinations of three rays, which it calls its generators.
 
     rays (3, 4): generators by rows, (sigma, tau, u, v) in the camera frame: each starts at (u, v, 0), scene units, and

@@ -9,6 +9,7 @@ import numpy as np
 from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.general_linear import GeneralLinear
 from mpcam.cameras.general_linear_map import linear_numbers
+from mpcam.cameras.general_linear_tables import PiecewiseTable
 from mpcam.cameras.general_linears_makers import PiecewiseMakers
 from mpcam.cameras.linear_pieces import LinearPieces
 from mpcam.cameras.symmetric import finite_pixel
@@ -21,7 +22,7 @@ MOST = 1 << 15  # pixels along a side
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class GeneralLinears(PiecewiseMakers, Camera):
+class GeneralLinears(PiecewiseMakers, PiecewiseTable, Camera):
     """General linear cameras in the tiles of a grid: columns, rows, or both; a tile may be cut into two by a diagonal.
 
     rays (N, 3, 4): generators of each piece, (sigma, tau, u, v) in the frame of the piece. image (N, 3, 2): where they

@@ -53,7 +53,7 @@ class ArrayTable(Table, tag_field="model", frozen=True):
 def camera_table(model: type[Camera]) -> type[Struct]:
     """The type of the table of one model."""
     name = snake_case(model.__name__)
-    if not fits_a_table(model):
+    if not fits_a_table(model) and not hasattr(model, "from_table"):
         return defstruct(name, [], bases=(ArrayTable,), tag=name, frozen=True, kw_only=True)
     fields: list[Any] = []
     for key, (kind, default) in table_keys(model).items():

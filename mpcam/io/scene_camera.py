@@ -48,7 +48,17 @@ def build_camera(table: CameraTable | CameraFile, bounds: np.ndarray, folder: Pa
         if model.ray_geometry == "parallel" and "scale" not in given:  # no place makes their view wider
             given["scale"] = _fitting_scale(bounds, table.size)
         camera = from_table(model, *table.size, given)
+        if any(key in given for key in getattr(model, "placed_by", ())):
+            return _placed(table, camera, text)
         return camera.with_pose(_pose(table, bounds, camera, text))
+
+
+def _placed(table: CameraTable, camera: Camera, text: SceneText) -> Camera:
+    """A camera that its own keys place."""
+    for key in ("eye", "target", "up", "camera_from_world"):
+        if getattr(table, key) is not None:
+            raise text.error(("camera", key), "the other keys place this camera: leave it out")
+    return camera
 
 
 def camera_to_toml(camera: Camera) -> str:
