@@ -245,6 +245,8 @@ SECTIONS = (
     ('`model = "radial"`', camera_table(mpcam.Radial), CameraTable),
     ('`model = "pinhole"`', camera_table(mpcam.Pinhole), CameraTable),
     ('`model = "orthographic"`', camera_table(mpcam.Orthographic), CameraTable),
+    ('`model = "general_linear"`', camera_table(mpcam.GeneralLinear), CameraTable),
+    ('`model = "general_linears"`', camera_table(mpcam.GeneralLinears), CameraTable),
     ("### A camera from a file", CameraFile, None),
     ('`type = "directional"`', tables.DirectionalTable, None),
     ('`type = "point"`', tables.PointTable, None),
