@@ -225,6 +225,7 @@ def test_light_leaves_a_lens_of_any_size(size):
     clear = np.linalg.norm(end - start, axis=1) > 0.1 * size
     found = caustic_photons._leaving(reflector_of(Surface.ellipsoid(radii)), start, ways, index)
     assert np.abs(found - expected)[clear].max() < 1e-6 and 50 < (expected > 0.5).sum() < 190
+    assert not caustic_photons._leaving(reflector_of(Surface.ellipsoid(radii)), 2 * end, normals, index).any()
 
 
 def test_where_a_mirror_of_any_size_is_met_again():
