@@ -233,7 +233,7 @@ def test_where_a_mirror_of_any_size_is_met_again():
     place = np.array(LIGHT.position)
     ring = Surface.cylinder(1.0, 1.5, 2 * PI, (0, 0, 0.75))
     cams = mp.decompose(ring, place, 20, resolution=4)
-    for size in (1e-3, 1.0, 1e3):
+    for size in (1e-3, 1e3):
         ring = reflector_of(Surface.cylinder(size, 1.5 * size, 2 * PI, (0, 0, 0.75 * size)))
         bigger = dataclasses.replace(cams, vertices=size * cams.vertices, eye=size * cams.eye)
         found = caustic_photons.photons(size * place, ring, bigger, 64)

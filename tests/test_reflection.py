@@ -107,12 +107,11 @@ def test_refraction_comes_near_to_the_true_surface():
     assert metrics.image_rmse(straight, truth) > 2 * errors[0]
 
 
-@pytest.mark.parametrize("settings", [{"triangles": 26, "resolution": 8}, {"method": "raytrace"}])
-def test_a_mirror_of_a_color_takes_light_away(settings):
+def test_a_mirror_of_a_color_takes_light_away():
     color = np.array([0.5, 0.25, 0.0])
     shown = scene(WAVE)
-    clear = Reflection(shown, **settings)
-    image = Reflection(shown, mirror=mp.Mirror(WAVE, color=tuple(color)), **settings).image()
+    clear = Reflection(shown, method="raytrace")
+    image = Reflection(shown, mirror=mp.Mirror(WAVE, color=tuple(color)), method="raytrace").image()
     seen = (image != clear.image()).any(-1)
     assert seen.sum() > 1000 and clear.mask[seen].all()
     expected = np.where(seen[..., None], clear.image() * color, clear.image())
