@@ -180,6 +180,14 @@ def test_far_from_the_origin_and_small():
     assert np.allclose(far.energy.view, near.energy.view, rtol=1e-3)
 
 
+def test_mirrors_may_take_a_color_away():
+    color = (1.0, 0.0, 0.5)
+    assert Settings(reflectance=0).reflectance == (0.0, 0.0, 0.0)
+    found, white = flat(reflectance=color), flat()
+    assert white.irradiance.max() > 0.01
+    assert np.allclose(found.irradiance, white.irradiance * color, rtol=1e-5, atol=1e-9)
+
+
 # What hides light
 
 
@@ -367,11 +375,6 @@ def test_as_paths_over_the_true_surface(name):
 
 
 # Mistakes
-
-
-def test_mirrors_may_take_a_color_away_whole():
-    assert Settings(reflectance=(1, 0, 0.5)).reflectance == (1.0, 0.0, 0.5)
-    assert Settings(reflectance=0).reflectance == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
