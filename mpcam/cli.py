@@ -182,6 +182,8 @@ def render(
     from mpcam.rendering.shade import shade
 
     layers = format_of(output).layers
+    if projection is not None and view is not None and view.camera is not None:
+        raise InputError(f"--projection {projection} does not go with --camera, which has its own: give one of the two")
     if shadow_size is not None and not shadows:
         raise InputError(f"--shadow-size {shadow_size} goes with --shadows: give that too")
     check_machine()
@@ -224,10 +226,19 @@ for command in (decompose, caustics, surround):
     app.command(command)
 
 
+def _no_option(_: type, text: str | None) -> None:
+    """A hyphen alone is standard input; what begins with two is a mistyped option, and no file."""
+    if text is not None and text.startswith("--"):
+        raise ValueError(f"{text} is no option: mpcam project --help lists them")
+
+
+_FILE_OR_STDIN = Parameter(allow_leading_hyphen=True, validator=_no_option)
+
+
 @app.command
 def project(
-    scene: str,
-    points: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    scene: Annotated[str, _FILE_OR_STDIN],
+    points: Annotated[str | None, _FILE_OR_STDIN] = None,
     /,
     *,
     view: View | None = None,

@@ -30,7 +30,7 @@ class View:
             JSON, or an EXR image that mpcam wrote.
         eye: Point x,y,z to look from; if not given, where the file says, else where all meshes are seen.
         target: Point x,y,z to look at; the middle of the meshes if not given.
-        up: Direction x,y,z towards the top of the image.
+        up: Direction x,y,z towards the top of the image; if not given, y for OBJ, PLY and glTF files, else z.
     """
 
     camera: str | None = None

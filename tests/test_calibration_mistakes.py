@@ -137,7 +137,7 @@ def test_files_that_are_not_calibrations(tmp_path):
     (tmp_path / "notes.txt").write_text("hello world, these are notes\n")
     (tmp_path / "image.yaml").write_bytes(b"\xff\xfe\x00")
     for name, message in (
-        ("notes.txt", "not recognized as a calibration of colmap, ocam, nerfstudio, .*: give its format"),
+        ("notes.txt", "not recognized as a calibration of colmap, ocam, nerfstudio, .*: give a file of one of these"),
         ("image.yaml", "is not text"),
         ("none.yaml", "cannot be read: No such file"),
         (".", "is a folder without a COLMAP model: give cameras.bin"),

@@ -105,6 +105,8 @@ def test_several_cameras_in_one_file(tmp_path):
     bent = dict(zip(("k1", "k2", "p1", "p2", "k3"), PLAIN.tolist(), strict=True))
     (tmp_path / "b.yaml").write_text(yaml.safe_dump(named | bent))
     assert off(mp.read_calibration(tmp_path / "b.yaml")["camera"], PLAIN) < 1e-9
+    (tmp_path / "d.yaml").write_text(yaml.safe_dump(named | {"is_fisheye": 1, "k1": 0.1, "k4": -0.001}))
+    assert off(mp.read_calibration(tmp_path / "d.yaml")["camera"], np.array([0.1, 0, 0, -0.001])) < 1e-9
     columns = {"intrinsic_matrix": [300, 0, 0, 0, 301, 0, 320, 240, 1], "width": 640, "height": 480}
     (tmp_path / "c.json").write_text(json.dumps(columns))
     assert off(mp.read_calibration(tmp_path / "c.json")["camera"], np.zeros(5)) < 1e-9

@@ -66,6 +66,17 @@ def test_kalibr_poses(tmp_path, first, second):
     assert all(same_lens(camera) for camera in cameras.values())
 
 
+@pytest.mark.parametrize("chained", [1, 2])
+def test_kalibr_poses_by_the_chain_and_by_the_imu_in_one_file(tmp_path, chained):
+    """Of three cameras one hangs on the camera before it, the other on the IMU."""
+    keys = {f"cam{n}": {"T_cn_cnm1": RELATIVE} if n == chained else {"T_cam_imu": BODY1} for n in (1, 2)}
+    (tmp_path / "chain.yaml").write_text(chain(cam0={"T_cam_imu": BODY0}, **keys))
+    cameras = mp.read_calibration(tmp_path / "chain.yaml")
+    expected = np.array(RELATIVE) if chained == 1 else np.linalg.matrix_power(RELATIVE, 2)
+    assert np.allclose(cameras["cam1"].camera_from_world, RELATIVE, rtol=0, atol=1e-15)
+    assert np.allclose(cameras["cam2"].camera_from_world, RELATIVE if chained == 1 else expected, rtol=0, atol=1e-15)
+
+
 def test_openvins_writes_kalibr_with_opencvs_first_line(tmp_path):
     text = chain(cam0={"T_imu_cam": np.linalg.inv(BODY0).tolist()}, cam1={"T_imu_cam": np.linalg.inv(BODY1).tolist()})
     (tmp_path / "chain.yaml").write_text(f"%YAML:1.0 # needed by OpenCV\n\n{text}")
@@ -223,6 +234,20 @@ def test_orb_slam(tmp_path):
         matrix = np.array([[HERE[0], 0, HERE[2]], [0, HERE[1], HERE[3]], [0, 0, 1]])
         theirs, _ = cv2.projectPoints(POINTS[:, None], ZERO, ZERO, matrix, np.array(coefficients))
         assert np.abs(theirs[:, 0] + 0.5 - found.project(POINTS).pixel[:, 0]).max() < 1e-9
+
+
+def test_orb_slam_coefficients_that_are_not_there_are_0(tmp_path):
+    data = {"Camera.type": "KannalaBrandt8", "Camera.width": 512, "Camera.height": 512}
+    found = mp.read_calibration(write(tmp_path / "a.yaml", data | orb("Camera1", "KannalaBrandt8", K[0])))["1"]
+    assert same_lens(found, mp.KannalaBrandt(512, 512, 190.98, 190.97, 255.43, 257.4, [K[0], 0, 0, 0]))
+
+
+def test_an_orb_slam_pair_without_a_pose_keeps_its_lenses(tmp_path):
+    data = {"Camera.type": "KannalaBrandt8", "Camera.width": 512, "Camera.height": 512}
+    pair = orb("Camera1", "KannalaBrandt8", *K) | orb("Camera2", "KannalaBrandt8", *K)
+    with pytest.warns(UserWarning, match="Stereo.T_c1_c2 or Tlr: is missing: the lens is read and its pose left out"):
+        cameras = mp.read_calibration(write(tmp_path / "a.yaml", data | pair))
+    assert all(same_lens(one) and np.array_equal(one.camera_from_world, np.eye(4)) for one in cameras.values())
 
 
 @pytest.mark.parametrize("key", ["Stereo.T_c1_c2", "Tlr"])

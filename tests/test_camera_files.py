@@ -1,5 +1,6 @@
 """A file wherever a camera is needed: scene files, --camera, names, sizes, and where the camera is put."""
 
+import io
 import re
 
 import numpy as np
@@ -146,8 +147,10 @@ def test_render_from_a_file_of_a_rig(folder, capsys):
     assert capsys.readouterr().err.count("mpcam:") == 0
 
 
-def test_project_through_a_file(folder, capsys):
-    (folder / "p.csv").write_text("x,y,z\n0,1,0\n1,0,1\n")
+def test_project_through_a_file(folder, capsys, monkeypatch):
+    text = "x,y,z\n0,1,0\n1,0,1\n"
+    (folder / "p.csv").write_text(text)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     camera = mp.read_calibration("chain.yaml")["cam1"]
     points = np.array([[0.0, 1, 0], [1, 0, 1]])
     moved = camera.with_pose(mp.look_at((-3, 1, 2), (0, 1, 0)))
@@ -156,6 +159,7 @@ def test_project_through_a_file(folder, capsys):
     for arguments, expected in (
         (["chain.yaml:cam1", "p.csv"], camera),
         (["--camera", "chain.yaml:cam1", "p.csv"], camera),
+        (["--camera", "chain.yaml:cam1", "-"], camera),
         ([*eye, "--target", "0,1,0", "p.csv"], moved),
         (["tent.obj", "p.csv", *eye], up),
         (["camera.json", "p.csv"], DOUBLE.with_pose(POSE)),
@@ -180,6 +184,10 @@ def test_project_through_a_file(folder, capsys):
         ("render tent.obj --output a.png --eye 0,1,0", "eye 0,1,0 is where the target is: give another point"),
         ("render tent.obj --output a.png --eye 0,1", "--eye 0,1: give three numbers"),
         ("render tent.obj --output a.png --eye 3,1,0 --up 0,0,0", "up 0,0,0: give a direction"),
+        (
+            "render tent.obj --output a.png --camera K.yml --projection equisolid",
+            "--projection equisolid does not go with",
+        ),
         ("compare --demo --camera chain.yaml:cam1", "do not go with --demo"),
         ("project chain.yaml:cam1", "POINTS are missing"),
         ("project --camera chain.yaml:cam1 p.csv --eye 1,2,3", "eye 1,2,3 needs a target"),

@@ -9,7 +9,9 @@ from scipy.ndimage import binary_erosion, gaussian_filter
 
 import mpcam as mp
 from mpcam.decomposition.ray_error import bent
+from mpcam.decomposition.reflector import pixel_hits, reflector_of
 from mpcam.effects import caustic_photons
+from mpcam.effects.caustic_settings import Settings
 from mpcam.effects.caustics import Caustics, caustics
 from mpcam.geometry.surfaces import Surface
 from mpcam.math import PI
@@ -178,6 +180,14 @@ def test_far_from_the_origin_and_small():
     assert np.allclose(far.energy.view, near.energy.view, rtol=1e-3)
 
 
+def test_mirrors_may_take_a_color_away():
+    color = (1.0, 0.0, 0.5)
+    assert Settings(reflectance=0).reflectance == (0.0, 0.0, 0.0)
+    found, white = flat(reflectance=color), flat()
+    assert white.irradiance.max() > 0.01
+    assert np.allclose(found.irradiance, white.irradiance * color, rtol=1e-5, atol=1e-9)
+
+
 # What hides light
 
 
@@ -209,6 +219,39 @@ def test_borders_of_objects_lose_nothing():
 def test_mirror_met_again_stops_light():
     found = caustics(FLOOR, Surface.cylinder(1.0, 1.5, 5.5, (0, 0, 0.75)), LIGHT, EYE, photons=128, resolution=16)
     assert 0 < found.energy.receivers[0] < 0.9 * found.energy.reflector[0]
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_light_leaves_a_lens_of_any_size(size):
+    """From one point of an ellipsoid to another, by the angle at the other."""
+    radii, index = size * np.array([1.0, 0.6, 0.8]), 1 / 1.5
+    ends = np.random.default_rng(2).normal(size=(2, 200, 3)) * radii
+    start, end = ends / np.linalg.norm(ends / radii, axis=-1, keepdims=True)
+    ways = (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
+    normals = end / radii**2 / np.linalg.norm(end / radii**2, axis=1, keepdims=True)
+    expected = caustic_photons.transmitted((ways * normals).sum(1), index)
+    clear = np.linalg.norm(end - start, axis=1) > 0.1 * size
+    found = caustic_photons._leaving(reflector_of(Surface.ellipsoid(radii)), start, ways, index)
+    assert np.abs(found - expected)[clear].max() < 1e-6 and 50 < (expected > 0.5).sum() < 190
+    assert not caustic_photons._leaving(reflector_of(Surface.ellipsoid(radii)), 2 * end, normals, index).any()
+
+
+def test_where_a_mirror_of_any_size_is_met_again():
+    """In a ring all light that comes from within crosses it once more, which ends below or above, or on it."""
+    place = np.array(LIGHT.position)
+    ring = Surface.cylinder(1.0, 1.5, 2 * PI, (0, 0, 0.75))
+    cams = mp.decompose(ring, place, 20, resolution=4)
+    for size in (1e-3, 1e3):
+        ring = reflector_of(Surface.cylinder(size, 1.5 * size, 2 * PI, (0, 0, 0.75 * size)))
+        bigger = dataclasses.replace(cams, vertices=size * cams.vertices, eye=size * cams.eye)
+        found = caustic_photons.photons(size * place, ring, bigger, 64)
+        first = pixel_hits(found.camera, ring)
+        points = first.points / size
+        outwards = points * (1, 1, 0)
+        ways = first.along - 2 * (first.along * outwards).sum(1, keepdims=True) * outwards
+        reach = -2 * (ways * outwards).sum(1) / (ways[:, :2] ** 2).sum(1)
+        again = (reach > 1e-9) & (abs(points[:, 2] + reach * ways[:, 2] - 0.75) < 0.75)
+        assert np.array_equal(found.share.ravel() > 0, first.hit & ~again) and 500 < again[first.hit].sum() < 1000
 
 
 # What moves

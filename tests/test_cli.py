@@ -67,6 +67,7 @@ def test_version(capsys):
         ("compare cube --repeats 0", "repeats"),
         ("compare cuba", "cube"),
         ("project cube", "POINTS"),
+        ("project --jsn cube no-such-file", "--jsn is no option"),
         ("project cube no-such-file", "no-such-file"),
         ("project no-such-camera.json no-such-file", "no-such-camera.json"),
         ("doctor --jsn", "--json"),

@@ -10,6 +10,7 @@ import numpy as np
 import pygltflib as gl
 import pytest
 from gltf_kit import Writer, triangle
+from scipy.spatial.transform import Rotation
 
 from mpcam import InputError, load_mesh
 
@@ -141,6 +142,32 @@ def test_instances(tmp_path):
     np.testing.assert_allclose(mesh.corners[0], CORNERS + [0, 100, 5])
     # a quarter turn: x to y, y to -x
     np.testing.assert_allclose(mesh.corners[1], [[10, 100, 0], [10, 102, 0], [7, 100, 0]], atol=1e-12)
+
+
+def test_turns_are_those_of_quaternions(tmp_path):
+    """About any axis, of any length, on nodes and on instances: as SciPy turns."""
+    turns = np.random.default_rng(3).normal(size=(6, 4))
+    writer = Writer()
+    number = triangle(writer)
+    for turn in turns[:3]:
+        writer.node(number, rotation=(turn / np.linalg.norm(turn)).tolist())
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"ROTATION": writer.add(turns[3:])}}}
+    writer.node(number, extensions=extension)
+    expected = [Rotation.from_quat(turn).apply(CORNERS) for turn in turns]
+    np.testing.assert_allclose(load_mesh(writer.save(tmp_path / "a.glb", "glb")).corners, expected, atol=1e-6)
+
+
+def test_mirrored_nodes_keep_the_outside_outside(tmp_path):
+    """The winding is turned with the space, as glTF has it; normals follow the surface."""
+    writer = Writer()
+    normals = np.array([[0.6, 0, 0.8]] * 3)
+    attributes = {"POSITION": writer.add(CORNERS), "NORMAL": writer.add(normals)}
+    mirrored, turn = [-1, 2, 1], Rotation.from_rotvec([0.3, -0.4, 0.5])
+    writer.node(writer.mesh(attributes), scale=mirrored, rotation=turn.as_quat().tolist())
+    mesh: Any = load_mesh(writer.save(tmp_path / "a.glb", "glb"))
+    np.testing.assert_allclose(mesh.corners[0], turn.apply(CORNERS * mirrored)[[0, 2, 1]], atol=1e-6)
+    expected = turn.apply(normals[0] / mirrored) / np.linalg.norm(normals[0] / mirrored)
+    np.testing.assert_allclose(mesh.normals, [expected] * 3, atol=1e-6)
 
 
 def test_skins_are_placed_by_their_joints(tmp_path):

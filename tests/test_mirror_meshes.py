@@ -7,6 +7,7 @@ import pytest
 
 import mpcam as mp
 from mpcam.decomposition.reflector import Reflector
+from mpcam.decomposition.welding import has_area
 from mpcam.decomposition.winding import first_of_each, reversed_faces
 from mpcam.effects.mirror_rays import mirror_rays
 from mpcam.effects.reflection import Reflection
@@ -100,6 +101,17 @@ def test_a_stray_face_does_not_move_the_center():
         assert np.abs(found.center).max() < 0.01 and abs(found.radius - 1) < 0.01
 
 
+def test_area_is_told_from_rounding():
+    """Corners on one line but for the last bit have none, thin and tiny triangles have one; whichever edge is long."""
+    way = np.array([1e-9, 0.7, -0.3])
+    none = np.array([[np.zeros(3), way, way * 1e-7 / 7], [np.zeros(3), way / 3, way], [way, way, way]])
+    some = np.array([[(0, 0, 0), (1, 0, 0), (0.5, 1e-9, 0)], [(0, 0, 0), (1e-6, 0, 0), (1, 1e-6, 0)]])
+    for order in ([0, 1, 2], [0, 2, 1]):
+        for size in (1e-30, 1.0, 1e30):
+            assert not has_area(size * none[:, order]).any()
+            assert has_area(size * some[:, order]).all()
+
+
 def test_normals_against_the_winding_give_the_same_error():
     """To the bit: only their sides differ."""
     along, against = (KINDS[kind] for kind in ("with normals", "normals against the winding"))
@@ -135,6 +147,10 @@ def test_what_has_one_side_is_said():
     fan = [(0, 1, 2), (1, 0, 3), (0, 1, 4)]
     corners = [(0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (-1, -1, 0)]
     with pytest.warns(UserWarning, match="3 faces share an edge with two or more others \\(0, 1, 2\\)"):
+        Reflector(mp.Mesh(corners, fan))
+    fan += [(1, 0, 5), (0, 1, 6)]
+    corners += [(-1, 1, 0), (1, 1, 0)]
+    with pytest.warns(UserWarning, match="5 faces share an edge with two or more others \\(0, 1, 2, 3, 4\\)"):
         Reflector(mp.Mesh(corners, fan))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -20,7 +20,8 @@ RNG = np.random.default_rng(3)
 
 def looking(target, eye, size=64, focal=70.0):
     pose = mp.look_at(eye, target, (0.1, 0.3, 0.9))
-    return mp.Pinhole(size, size, fx=focal, fy=focal, cx=size / 2 + 0.3, cy=size / 2 - 0.2, camera_from_world=pose)
+    height = size * 7 // 8
+    return mp.Pinhole(size, height, fx=focal, fy=focal, cx=size / 2 + 0.3, cy=height / 2 - 0.2, camera_from_world=pose)
 
 
 def pixel_directions(camera):

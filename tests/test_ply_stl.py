@@ -44,6 +44,20 @@ def test_binary_with_triangles_and_quads(tmp_path, encoding, order, types):
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2], [3, 2, 1], [3, 1, 0], [1, 2, 3]])
 
 
+@pytest.mark.parametrize(("encoding", "order"), [("binary_little_endian", "<"), ("binary_big_endian", ">")])
+@pytest.mark.parametrize("length", "hi")
+def test_lengths_of_lists_are_numbers_of_many_bytes(tmp_path, encoding, order, length):
+    """3 and 259 differ in one byte alone, be it the first or the last."""
+    corners = np.arange(259) * (2 * np.pi / 259)
+    body = b"".join(struct.pack(f"{order}3f", np.cos(angle), np.sin(angle), 0) for angle in corners)
+    for face in ((0, 100, 200), range(259), (0, 50, 100)):
+        body += struct.pack(f"{order}{length}{len(face)}h", len(face), *face)
+    face = f"face 3, list {'short' if length == 'h' else 'int'} short vertex_indices"
+    mesh = load(tmp_path, "a.ply", ply(body, VERTEX.replace("4", "259"), face, encoding=encoding))
+    assert mesh.triangle_count == 259
+    np.testing.assert_array_equal(mesh.faces[[0, -1]], [[0, 100, 200], [0, 50, 100]])
+
+
 @pytest.mark.parametrize("tail", [b"", b"\n", b"\0\0", b"\r\n\x1a"])
 def test_a_tail_without_content(tmp_path, tail):
     body = b"".join(struct.pack("<3f", *corner) for corner in SQUARE) + struct.pack("<B3iB3i", 3, 0, 1, 2, 3, 0, 2, 3)

@@ -107,6 +107,17 @@ def test_refraction_comes_near_to_the_true_surface():
     assert metrics.image_rmse(straight, truth) > 2 * errors[0]
 
 
+def test_a_mirror_of_a_color_takes_light_away():
+    color = np.array([0.5, 0.25, 0.0])
+    shown = scene(WAVE)
+    clear = Reflection(shown, method="raytrace")
+    image = Reflection(shown, mirror=mp.Mirror(WAVE, color=tuple(color)), method="raytrace").image()
+    seen = (image != clear.image()).any(-1)
+    assert seen.sum() > 1000 and clear.mask[seen].all()
+    expected = np.where(seen[..., None], clear.image() * color, clear.image())
+    assert np.abs(image - expected).max() < 1e-6
+
+
 def test_rays_that_miss_see_the_environment():
     v, u = np.meshgrid(np.linspace(0, 1, 64), np.linspace(0, 1, 128), indexing="ij")
     sky = mp.EnvironmentMap.from_panorama(np.stack([u, v, 1 - u], -1), 128)

@@ -10,7 +10,7 @@ import mpcam as mp
 from mpcam.comparison import metrics
 from mpcam.effects.mirror_parts import ByVertices
 from mpcam.effects.reflection import Reflection
-from mpcam.effects.virtual_vertices import with_directions
+from mpcam.effects.virtual_vertices import _cones, with_directions
 
 BOWL = mp.Surface.paraboloid(1.2, 0.3)
 
@@ -116,3 +116,17 @@ def test_a_large_scene_is_seen_whole():
     truth = Reflection(shown, method="raytrace").image()
     image = Reflection(shown, method="vertex", triangles=1000).image()
     assert different(image, truth) < 0.004
+
+
+def test_cones_hold_the_rays_at_the_corners_and_little_more():
+    """What is too wide costs time and shows in no picture."""
+    table = np.random.default_rng(4).normal(size=(6, 3, 50)) * 0.3 + np.array([5, -3, 2.0])[:, None]
+    first, second = _cones(table).rows.flat.numpy().reshape(50, 2, 4).transpose(1, 2, 0)
+    ways = table[1::2] / np.linalg.norm(table[1::2], axis=1, keepdims=True)
+    for corners, middle, within in (
+        (table[0::2], first[:3], first[3]),
+        (ways, second[:3], second[3]),  # rounded up to 16 bits
+    ):
+        away = np.linalg.norm(corners - middle, axis=1).max(axis=0)
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max(axis=0)
+        assert (away <= within).all() and (within < 0.7 * sides).all()

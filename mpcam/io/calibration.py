@@ -72,7 +72,7 @@ def _read(document: Document, format: str | None) -> Calibration:
     if what is None:
         if document.path.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".npz"):
             document.tree  # noqa: B018 - says what is wrong with it
-        what = f"not recognized as a calibration of {', '.join(FORMATS)}: give its format"
+        what = f"not recognized as a calibration of {', '.join(FORMATS)}: give a file of one of these"
     raise InputError(f"{document.where}: {what}")
 
 
