@@ -12,6 +12,7 @@ from mpcam.math import Array, Vector, absolute, epsilon, isfinite, maximum, mini
 FAR = 1e9
 """Pixels; stands for infinity in boxes, so that no arithmetic on boxes makes NaN."""
 
+_LOOSE = 0.25  # of these roundings, by which values are widened
 _SLACK = 16.0  # roundings that the sign of a denominator, or of a numerator over a slit, has to be sure of
 
 
@@ -63,10 +64,12 @@ def _between(
             for k, (top, top_doubt) in enumerate(tops):
                 top, unsure = sign * top, _SLACK * epsilon(top_doubt) * top_doubt
                 value = top * inverse
+                # What a few roundings of both can change, next to a slit.
+                loose = _LOOSE * (absolute(value) * doubt + unsure) * inverse
                 upward = where(lost | (top >= -unsure), FAR, -FAR)
                 downward = where(lost | (top <= unsure), -FAR, FAR)
-                high[k] = where(both, maximum(high[k], where(regular, value, upward)), high[k])
-                low[k] = where(both, minimum(low[k], where(regular, value, downward)), low[k])
+                high[k] = where(both, maximum(high[k], where(regular, value + loose, upward)), high[k])
+                low[k] = where(both, minimum(low[k], where(regular, value - loose, downward)), low[k])
     return low, high
 
 

@@ -70,8 +70,12 @@ class LinearMap(NamedTuple):
         z = coefficients.z
         valid = (z >= 0) & isfinite(coefficients.right) & isfinite(coefficients.below) & isfinite(z)
         a, b, c, d, right, below, z = (where(valid, part, 1.0) for part in coefficients)
+        # Near a center all entries are tiny, and float32 would lose their products.
+        largest = maximum(maximum(absolute(a), absolute(b)), maximum(absolute(c), absolute(d)))
+        unit = 1.0 / detach(where(largest > 0, largest, 1.0))
+        a, b, c, d, right, below = (unit * part for part in (a, b, c, d, right, below))
         determinant = a * d - b * c
-        sure = absolute(determinant) > _UNSURE * epsilon(z) * self._doubt(z, a, b, c, d)
+        sure = absolute(determinant) > _UNSURE * epsilon(z) * self._doubt(z, unit, a, b, c, d)
         inverse = 1.0 / where(sure, determinant, 1.0)
         px, py = (d * right - b * below) * inverse, (a * below - c * right) * inverse
         sure = sure & valid & isfinite(px) & isfinite(py)
@@ -80,9 +84,10 @@ class LinearMap(NamedTuple):
         depth = where(sure, z * norm(vector(sigma, tau, 1.0 + 0.0 * sigma)), 0.0)
         return Projection(vector(px, py), depth, sure)
 
-    def _doubt(self, z: Array, *entries: Array) -> Array:
-        """What one rounding of each of the four entries can change in their determinant."""
-        (a, b, c, d), sizes = (absolute(detach(entry)) for entry in entries), self.sizes(detach(z))
+    def _doubt(self, z: Array, unit: Array, *entries: Array) -> Array:
+        """What one rounding of each of the four entries, in some unit, can change in their determinant."""
+        a, b, c, d = (absolute(detach(entry)) for entry in entries)
+        sizes = [unit * size for size in self.sizes(detach(z))]
         return sizes[0] * d + a * sizes[3] + sizes[1] * c + b * sizes[2]
 
     def slits(self) -> tuple[Array, Array]:
