@@ -171,7 +171,10 @@ def _indices(corners: list[str], path: Path) -> np.ndarray:
             pieces = [(corner + "//").split("/")[:3] for corner in corners]
             index[:] = np.array([[int(a), int(b or 0), int(c or 0)] for a, b, c in pieces]) - 1
     except (ValueError, OverflowError):
-        raise InputError(f"{path}: a face corner is not of the form v, v/vt, v//vn or v/vt/vn") from None
+        wrong = next((c for c in corners if not re.fullmatch(r"[+-]?\d+(/[+-]?\d*){0,2}", c)), max(corners, key=len))
+        raise InputError(
+            f"{path}: the face corner {wrong[:40]!r} is not of the form v, v/vt, v//vn or v/vt/vn"
+        ) from None
     return index
 
 
@@ -182,12 +185,22 @@ def _columns(rows: list[list[str]], width: int, path: Path, name: str, fill: flo
     shortest = min(len(row) for row in rows)
     if shortest < width:
         if fill is None or shortest == 0:
-            raise InputError(f"{path}: a {name} line has {shortest} numbers; it needs {width}")
+            line = " ".join([name, *min(rows, key=len)])
+            raise InputError(f"{path}: the line {line!r} has {shortest} numbers; it needs {width}")
         rows = [row + [str(fill)] * (width - len(row)) for row in rows]
     try:
         return np.array([row[:width] for row in rows], dtype=np.float64)
     except ValueError:
-        raise InputError(f"{path}: a {name} line holds something that is not a number") from None
+        wrong = next(word for row in rows for word in row[:width] if not _is_number(word))
+        raise InputError(f"{path}: a {name} line holds {wrong[:40]!r}, which is not a number") from None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _colors(rows: list[list[str]], path: Path, say: Say) -> np.ndarray | None:
