@@ -5,25 +5,9 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras import bent_rays, three_rays
-from mpcam.cameras.hulls import minus
+from mpcam.cameras.plane_sweep import ROUNDINGS, plane_sweep
 from mpcam.cameras.types import Projection
-from mpcam.math import (
-    Array,
-    Vector,
-    absolute,
-    cross,
-    detach,
-    dot,
-    epsilon,
-    isfinite,
-    library,
-    maximum,
-    minimum,
-    norm,
-    take,
-    vector,
-    where,
-)
+from mpcam.math import Array, Vector, detach, epsilon, isfinite, library, maximum, norm, take, vector, where
 
 
 def images_of(camera: Any, points: Array) -> Projection:
@@ -119,33 +103,15 @@ def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, 
 def _closed_form(
     places: tuple[Vector, ...], rays: tuple[Vector, ...], point: Vector
 ) -> tuple[Array, Array, Array, Array]:
-    """The one image where rays have the same part along the triangle's normal: weights, depth and validity.
-
-    Yu et al. 2009, eq. 5, in terms of the triangle: how far the point lies off its plane gives the sweep, and the
-    weights in the swept triangle are ratios of areas. A point on the other side, or where the swept triangle has no
-    area (in the plane of a slit), has no image.
-    """
-    # Component by component: tables of camera triangles and of points broadcast against each other.
-    a, b, c = places
-    normal = cross(minus(b, a), minus(c, a))
-    part = dot(normal, rays[0])
-    sweep = dot(normal, minus(point, a)) / where(part != 0, part, 1.0)
-    p, q, r = (vector(*(place[i] + sweep * ray[i] for i in range(3))) for place, ray in zip(places, rays, strict=True))
-    right, down, back = minus(q, p), minus(r, p), minus(p, point)
-    area = dot(normal, cross(right, down))
-    size = norm(a) + norm(b) + norm(c) + norm(point) + absolute(sweep) * (norm(rays[0]) + norm(rays[1]) + norm(rays[2]))
-    doubt = epsilon(area) * detach(size * norm(normal) * (norm(right) + norm(down)))
-    sure = absolute(area) > three_rays.SLACK / three_rays.UNCERTAIN * doubt
-    inverse = 1.0 / where(sure, area, 1.0)
-    second = dot(normal, cross(down, back)) * inverse
-    third = -dot(normal, cross(right, back)) * inverse
-    slack = minimum(three_rays.SLACK * doubt * absolute(detach(inverse)), three_rays.LARGEST_SLACK)
-    sweep_slack = three_rays.SLACK * epsilon(area) * detach(norm(a) + norm(b) + norm(c) + norm(point)) / norm(rays[0])
+    """The one image where rays have the same part along the triangle's normal: weights, depth and validity."""
+    second, third, distance, sure, slack = plane_sweep(places, rays, point)
     first = 1.0 - second - third
-    inside = (first >= -slack) & (second >= -slack) & (third >= -slack) & (sweep >= -sweep_slack)
+    size = sum(norm(place) for place in places) + norm(point)
+    behind = ROUNDINGS * epsilon(first) * detach(size) / norm(rays[0])
+    inside = (first >= -slack) & (second >= -slack) & (third >= -slack) & (distance >= -behind)
     length = norm(vector(*(first * x + second * y + third * z for x, y, z in zip(*rays, strict=True))))
-    valid = sure & inside & isfinite(second) & isfinite(third) & isfinite(sweep)
-    return second, third, maximum(sweep, 0.0) * length, valid
+    valid = sure & inside & isfinite(second) & isfinite(third) & isfinite(distance)
+    return second, third, maximum(distance, 0.0) * length, valid
 
 
 def _at(table: Vector, face: Array) -> Vector:

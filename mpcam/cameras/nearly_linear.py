@@ -8,6 +8,7 @@ on both weights and the distance together end there, without a cubic.
 from typing import Any, NamedTuple
 
 from mpcam.cameras.hulls import minus
+from mpcam.cameras.plane_sweep import plane_sweep
 from mpcam.math import Array, Vector, absolute, cross, dot, epsilon, isfinite, norm, vector, where
 
 
@@ -26,25 +27,11 @@ class NearImage(NamedTuple):
 def near_image(places: Any, rays: Any, point: Vector, steps: int = 2) -> NearImage:
     """The image of a point (scene units) in camera triangles with corners and rays (three vectors each).
 
-    The start is exact where all rays have the same part along the normal (Yu et al. 2009, eq. 5). Where the residual is
+    The start is exact where all rays have the same part along the normal. Where the residual is
     not small, ask `three_rays.project`, which finds all images.
     """
     a, b, c = places
-    normal = cross(minus(b, a), minus(c, a))
-    parts = [dot(normal, ray) for ray in rays]
-    mean = (parts[0] + parts[1] + parts[2]) * (1.0 / 3.0)
-    usable = (parts[0] * parts[1] > 0) & (parts[1] * parts[2] > 0)
-    height = dot(normal, minus(point, a))
-    p, q, r = (
-        vector(*(place[i] + height / where(usable, part, 1.0) * ray[i] for i in range(3)))
-        for place, ray, part in zip(places, rays, parts, strict=True)
-    )
-    right, down, back = minus(q, p), minus(r, p), minus(p, point)
-    area = dot(normal, cross(right, down))
-    usable = usable & (absolute(area) > 16.0 * epsilon(area) * norm(normal) * norm(right) * norm(down))
-    inverse = 1.0 / where(usable, area, 1.0)
-    second, third = dot(normal, cross(down, back)) * inverse, -dot(normal, cross(right, back)) * inverse
-    distance = height / where(mean != 0, mean, 1.0)
+    second, third, distance, usable, _ = plane_sweep(places, rays, point)
     sides = minus(b, a), minus(c, a)
     turns = minus(rays[1], rays[0]), minus(rays[2], rays[0])
     for _ in range(steps):

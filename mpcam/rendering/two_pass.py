@@ -7,7 +7,6 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.base import Camera
-from mpcam.cameras.capabilities import Images, Projects, need
 from mpcam.cameras.linear_pieces import LinearPieces, linear_pieces
 from mpcam.checks import whole_number
 from mpcam.errors import InputError
@@ -15,7 +14,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.math import PI
 from mpcam.rendering import patches
 from mpcam.rendering.patches import LinearSampler, PointSampler
-from mpcam.rendering.vertex import MOST_TRIANGLES, Subdivision
+from mpcam.rendering.vertex import MOST_TRIANGLES, Subdivision, straight_test
 from mpcam.rendering.z_buffer import ZBuffered
 
 MOST_PAIRS = 1 << 22  # of pieces and triangles that are looked at together
@@ -102,19 +101,7 @@ class TwoPass(ZBuffered):
         self.data = (numbers, self.unit)
 
     def test_for(self, camera: Camera) -> str:
-        instead = "use method='invert' or 'raytrace'"
-        if linear_pieces(camera) is not None:
-            return "screen_triangle"
-        if camera.ray_geometry != "general":
-            need(camera, Images, "method='two_pass'", instead)
-            return "screen_triangle" if camera.ray_geometry == "central" else "pixel_triangle"
-        need(camera, Projects, "method='two_pass'", instead)
-        if camera.images_per_point != 1:
-            raise InputError(
-                f"method='two_pass' needs one image for each point; a {type(camera).__name__} has up to "
-                f"{camera.images_per_point}: {instead}"
-            )
-        return "screen_triangle"
+        return "screen_triangle" if linear_pieces(camera) is not None else straight_test(camera, self.method)
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr

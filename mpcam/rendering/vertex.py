@@ -43,17 +43,7 @@ class VertexProjected(ZBuffered):
         self.faces = self.parts.faces(self.corners, mesh.triangle_count)
 
     def test_for(self, camera: Camera) -> str:
-        instead = "use method='invert' or 'raytrace'"
-        if camera.ray_geometry != "general":
-            need(camera, Images, "method='vertex'", instead)
-            return "screen_triangle" if camera.ray_geometry == "central" else "pixel_triangle"
-        need(camera, Projects, "method='vertex'", instead)
-        if camera.images_per_point != 1:
-            raise InputError(
-                f"method='vertex' needs one image for each point; a {type(camera).__name__} has up to "
-                f"{camera.images_per_point}: {instead}"
-            )
-        return "screen_triangle"
+        return straight_test(camera, self.method)
 
     def place(self, vertices: Any) -> list[Any]:
         import drjit as dr
@@ -76,6 +66,21 @@ class VertexProjected(ZBuffered):
 
     def parent_weights(self, triangle: Any, second: Any, third: Any) -> tuple[Any, Any]:
         return self.parts.parent_weights(triangle, second, third)
+
+
+def straight_test(camera: Camera, method: str) -> str:
+    """The test for corners that a camera projects one by one; raises InputError where a point has no one image."""
+    instead = "use method='invert' or 'raytrace'"
+    if camera.ray_geometry != "general":
+        need(camera, Images, f"method={method!r}", instead)
+        return "screen_triangle" if camera.ray_geometry == "central" else "pixel_triangle"
+    need(camera, Projects, f"method={method!r}", instead)
+    if camera.images_per_point != 1:
+        raise InputError(
+            f"method={method!r} needs one image for each point; a {type(camera).__name__} has up to "
+            f"{camera.images_per_point}: {instead}"
+        )
+    return "screen_triangle"
 
 
 @functools.cache
