@@ -4,7 +4,17 @@ from typing import Any, Self
 
 import numpy as np
 
-from mpcam.checks import is_number, shown
+from mpcam.cameras.general_linear_given import (
+    a_nonzero,
+    a_number,
+    a_slit,
+    a_vector,
+    axis_pixel,
+    focal_lengths,
+    pixels_per_unit,
+    ray_rows,
+    seen_extent,
+)
 from mpcam.errors import InputError
 from mpcam.math.pose import look_at
 
@@ -38,12 +48,12 @@ class Makers:
         image (3, 2): where the three lie in the image, in widths and heights. The plane runs through the mean of the
         origins, and all rays start there. Raises InputError where rays run along the plane, or leave on both sides.
         """
-        start, along = _rows(origins, "origins"), _rows(directions, "directions")
+        start, along = ray_rows(origins, "origins"), ray_rows(directions, "directions")
         lengths = np.linalg.norm(along, axis=1)
         if not lengths.all():
             raise InputError(f"from_rays: direction {int(np.argmin(lengths))} is zero: give a direction")
         along = along / lengths[:, None]
-        axis = along.mean(axis=0) if normal is None else _vector(normal, "normal")
+        axis = along.mean(axis=0) if normal is None else a_vector(normal, "normal")
         if not np.linalg.norm(axis) > 1e-12:
             raise InputError("from_rays: the directions cancel out, which leaves no normal: give normal=, a direction")
         axis = axis / np.linalg.norm(axis)
@@ -75,8 +85,8 @@ class Makers:
         camera_from_world: Any = None,
     ) -> Self:
         """The same rays as `Pinhole`, and the same parameters."""
-        x, y = _frame_of(width, height, cx, cy)
-        fx, fy = _focal(width, fx, fy)
+        x, y = axis_pixel(width, height, cx, cy)
+        fx, fy = focal_lengths(width, fx, fy)
         return cls._made(width, height, camera_from_world, lambda px, py: ((px - x) / fx, (py - y) / fy, 0.0, 0.0))
 
     @classmethod
@@ -90,7 +100,7 @@ class Makers:
         camera_from_world: Any = None,
     ) -> Self:
         """The same rays as `Orthographic`, and the same parameters. scale: pixels per scene unit."""
-        (x, y), s = _frame_of(width, height, cx, cy), _scale(width, height, scale)
+        (x, y), s = axis_pixel(width, height, cx, cy), pixels_per_unit(width, height, scale)
         return cls._made(width, height, camera_from_world, lambda px, py: (0.0, 0.0, (px - x) / s, (py - y) / s))
 
     @classmethod
@@ -109,8 +119,8 @@ class Makers:
         step: scene units from one column to the next. focal: pixels, of the row, default width / 2. cx, cy: pixel of
         the axis. The slit is the path, the x axis of the camera frame.
         """
-        (x, y), f = _frame_of(width, height, cx, cy), _focal(width, focal, None)[0]
-        step = _nonzero("step", step)
+        (x, y), f = axis_pixel(width, height, cx, cy), focal_lengths(width, focal, None)[0]
+        step = a_nonzero("step", step)
         return cls._made(width, height, camera_from_world, lambda px, py: (0.0, (py - y) / f, (px - x) * step, 0.0))
 
     @classmethod
@@ -131,8 +141,8 @@ class Makers:
         plane through the target that is parallel to both slits, scene units; or width and height. up (3,): direction
         that points up in the image. Rays start on the first slit; the second may lie before or behind it.
         """
-        (p1, d1), (p2, d2) = (_slit(line, name) for line, name in ((first, "first"), (second, "second")))
-        goal = _vector(target, "target")
+        (p1, d1), (p2, d2) = (a_slit(line, name) for line, name in ((first, "first"), (second, "second")))
+        goal = a_vector(target, "target")
         axis = np.cross(d1, d2)
         if np.linalg.norm(axis) < 1e-9:
             raise InputError("cross_slit: the two slits are parallel, so that no plane lies along both: turn one")
@@ -145,10 +155,10 @@ class Makers:
                 f"cross_slit: along the normal of the slits, the second lies at {other:g} and the target at {depth:g} "
                 "from the first: no two of these may be equal"
             )
-        pose = _frame(goal - depth * axis, axis, _vector(up, "up"))
+        pose = _frame(goal - depth * axis, axis, a_vector(up, "up"))
         turn, shift = pose[:3, :3], pose[:3, 3]
         q1, q2, e1, e2 = ((turn @ p1 + shift)[:2], (turn @ p2 + shift)[:2], (turn @ d1)[:2], (turn @ d2)[:2])
-        wide, high = _extent(extent, width, height)
+        wide, high = seen_extent(extent, width, height)
         part = other / depth
 
         def ray(px: float, py: float) -> tuple[float, float, float, float]:
@@ -176,8 +186,8 @@ class Makers:
         slide: scene units from one row to the next. The others are those of `Pinhole`, for the row through cy. The slit
         is the x axis; rays of one row meet in a point of it and lie in a plane with it.
         """
-        (x, y), (fx, fy) = _frame_of(width, height, cx, cy), _focal(width, fx, fy)
-        slide = _nonzero("slide", slide)
+        (x, y), (fx, fy) = axis_pixel(width, height, cx, cy), focal_lengths(width, fx, fy)
+        slide = a_nonzero("slide", slide)
         return cls._made(
             width, height, camera_from_world, lambda px, py: ((px - x) / fx, (py - y) / fy, (py - y) * slide, 0.0)
         )
@@ -197,8 +207,8 @@ class Makers:
 
         twist: slope of the rays toward x, per scene unit along y. scale: pixels per scene unit. cx, cy: pixel of z.
         """
-        (x, y), s = _frame_of(width, height, cx, cy), _scale(width, height, scale)
-        k = _nonzero("twist", twist) / s
+        (x, y), s = axis_pixel(width, height, cx, cy), pixels_per_unit(width, height, scale)
+        k = a_nonzero("twist", twist) / s
         return cls._made(
             width, height, camera_from_world, lambda px, py: ((py - y) * k, 0.0, (px - x) / s, (py - y) / s)
         )
@@ -220,8 +230,8 @@ class Makers:
         twist: slope across the way from the axis, per scene unit from it; not zero. spread: the same along that way.
         scale: pixels per scene unit in the plane z = 0. cx, cy: pixel of the axis.
         """
-        (x, y), s = _frame_of(width, height, cx, cy), _scale(width, height, scale)
-        k, m = _nonzero("twist", twist), _number("spread", spread)
+        (x, y), s = axis_pixel(width, height, cx, cy), pixels_per_unit(width, height, scale)
+        k, m = a_nonzero("twist", twist), a_number("spread", spread)
 
         def ray(px: float, py: float) -> tuple[float, float, float, float]:
             u, v = (px - x) / s, (py - y) / s
@@ -246,8 +256,8 @@ class Makers:
         step: scene units along x from one row to the next. focal: pixels. Points have no image: those of the plane have
         a line of them, others none.
         """
-        (x, y), f = _frame_of(width, height, cx, cy), _focal(width, focal, None)[0]
-        step = _nonzero("step", step)
+        (x, y), f = axis_pixel(width, height, cx, cy), focal_lengths(width, focal, None)[0]
+        step = a_nonzero("step", step)
         return cls._made(width, height, camera_from_world, lambda px, py: ((px - x) / f, 0.0, (py - y) * step, 0.0))
 
     @classmethod
@@ -298,77 +308,3 @@ def _same(rows: np.ndarray, size: float) -> np.ndarray:
 
 def _turn(a: np.ndarray, b: np.ndarray) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
-
-
-def _frame_of(width: int, height: int, cx: float | None, cy: float | None) -> tuple[float, float]:
-    """The pixel of the axis, the middle if it is left out."""
-    return (
-        0.5 * width if cx is None else _number("cx", cx),
-        0.5 * height if cy is None else _number("cy", cy),
-    )
-
-
-def _focal(width: int, fx: float | None, fy: float | None) -> tuple[float, float]:
-    first = 0.5 * width if fx is None else _positive("focal length", fx)
-    return first, first if fy is None else _positive("fy", fy)
-
-
-def _scale(width: int, height: int, scale: float | None) -> float:
-    return 0.5 * min(width, height) if scale is None else _positive("scale", scale)
-
-
-def _number(name: str, value: Any) -> float:
-    if not is_number(value):
-        raise InputError(f"{name}={shown(value)}: a finite number is needed")
-    return float(value)
-
-
-def _positive(name: str, value: Any) -> float:
-    if not is_number(value) or not value > 0:
-        raise InputError(f"{name}={shown(value)}: a number above 0 is needed")
-    return float(value)
-
-
-def _nonzero(name: str, value: Any) -> float:
-    if _number(name, value) == 0:
-        raise InputError(f"{name}={shown(value)}: not zero, or it is another kind of camera")
-    return float(value)
-
-
-def _extent(value: Any, width: int, height: int) -> tuple[float, float]:
-    pair = np.atleast_1d(np.asarray(value, object))
-    wide = _positive("extent", pair[0])
-    if pair.shape not in ((1,), (2,)):
-        raise InputError(f"extent={shown(value)}: give a width, or a width and a height")
-    return wide, wide * height / width if len(pair) == 1 else _positive("extent", pair[1])
-
-
-def _slit(line: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        point, direction = line
-    except (TypeError, ValueError):
-        raise InputError(f"cross_slit: {name}={shown(line)}: give a point (3,) and a direction (3,)") from None
-    point, direction = _vector(point, f"{name}, its point"), _vector(direction, f"{name}, its direction")
-    if not direction.any():
-        raise InputError(f"cross_slit: the direction of the {name} slit is zero")
-    return point, direction / np.linalg.norm(direction)
-
-
-def _vector(value: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
-        raise InputError(f"{name}={shown(value)}: give three finite numbers")
-    return found
-
-
-def _rows(value: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.shape != (3, 3) or not np.isfinite(found).all():
-        raise InputError(f"from_rays: {name} has shape {np.shape(value)}: give (3, 3) finite numbers, a row for a ray")
-    return found
