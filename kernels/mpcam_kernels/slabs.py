@@ -66,12 +66,9 @@ def between(corners: list[Corner], near: Any, far: Any) -> list[list[Corner]]:
         seen = (dr.maximum(p.point.z, q.point.z) >= near) & (dr.minimum(p.point.z, q.point.z) <= far)
         ends.append([first, last])
         there.append(seen)
-    # An edge beyond the planes is left out: both of its ends become the last one that counts.
-    for k in (0, 1, 2, 0, 1):
-        before_it = ends[k - 1][1]
-        for i in range(2):
-            ends[k][i] = chosen(there[k], ends[k][i], before_it)
-        there[k] = there[k] | there[k - 1]
+    # One edge may lie beyond the planes: both of its ends become the last one of the edge before it.
+    for k in range(3):
+        ends[k] = [chosen(there[k], end, ends[k - 1][1]) for end in ends[k]]
     polygon = [end for edge in ends for end in edge]
     return [[polygon[0], polygon[k], polygon[k + 1]] for k in range(1, FANS + 1)]
 
