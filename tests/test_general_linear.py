@@ -335,6 +335,11 @@ def test_mistakes_are_named(make, words):
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_the_axis_of_an_epipolar_plane_image_is_its_middle():
+    ray = GL.epi(64, 20, 0.1).ray(np.array([32.0, 10.0]))
+    assert np.allclose(ray.origin, 0) and np.allclose(ray.direction, [0, 0, 1])
+
+
 def test_default_scale_fills_the_shorter_side():
     for make in (GL.orthographic, lambda w, h: GL.twisted_orthographic(w, h, 0.1)):
         for width, height in ((64, 20), (20, 64)):
