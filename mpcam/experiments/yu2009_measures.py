@@ -7,7 +7,8 @@ import numpy as np
 from mpcam.comparison.metrics import hit_errors, image_rmse
 from mpcam.experiments.common import mismatch
 
-_AT = 1e-7  # pixels from a border
+AT, HEIGHTS = 1e-9, 33
+"""Pixels from a border where rays are compared, and at how many heights."""
 
 
 def errors(
@@ -37,28 +38,30 @@ def holes(found: np.ndarray, expected: np.ndarray) -> int:
     return int(np.count_nonzero(~found & ~background[patches]))
 
 
-def seam(camera: Any, number: int | None = None) -> dict[str, float]:
-    """Largest jump of rays from the left to the right of borders between columns, or of one of them.
+def seam(camera: Any) -> dict[str, float]:
+    """Largest jump of rays from the left to the right of the borders between columns.
 
     degrees: between directions. units: how far the ray on the right starts from the line of that on the left, scene
     units.
     """
-    borders = camera.columns[1:-1] if number is None else camera.columns[number : number + 1]
-    y = np.linspace(0.0, camera.height, 33)
+    borders = camera.columns[1:-1]
+    y = np.linspace(0.0, camera.height, HEIGHTS)
     x = np.repeat(np.asarray(borders, float), len(y))
-    left, right = (camera.ray(np.stack([x + step, np.tile(y, len(borders))], axis=1)) for step in (-_AT, _AT))
+    left, right = (camera.ray(np.stack([x + step, np.tile(y, len(borders))], axis=1)) for step in (-AT, AT))
     turn = np.linalg.norm(np.cross(left.direction, right.direction), axis=1)
     gap = np.linalg.norm(np.cross(right.origin - left.origin, left.direction), axis=1)
     return {"degrees": float(np.degrees(np.arcsin(min(turn.max(), 1.0)))), "units": float(gap.max())}
 
 
-def seam_pixels(camera: Any, points: np.ndarray, number: int = 1) -> float:
-    """How far apart both neighbors of a border show points (N, 3) of the world that lie at it, pixels, at most.
+def seam_pixels(camera: Any, distances: tuple[float, ...]) -> float:
+    """How far from the border between the first two columns the second one shows what the first shows there, pixels.
 
-    Of points less than half a pixel from the border in the left neighbor, where both see them. NaN if there is none.
+    distances: from where rays start, of the points that are looked at; the worst of all counts.
     """
-    x = float(camera.columns[number])
-    first, second = (camera.piece(k).project(points) for k in (number - 1, number))
-    a, b = first.pixel[:, 0], second.pixel[:, 0]
-    near = first.valid[:, 0] & second.valid[:, 0] & (np.abs(a[:, 0] - x) < 1e-3)
-    return float(np.linalg.norm(a - b, axis=1)[near].max()) if near.any() else float("nan")
+    pixel = np.stack(np.broadcast_arrays(float(camera.columns[1]), np.linspace(0.0, camera.height, HEIGHTS)), axis=1)
+    ray, second, worst = camera.piece(0).ray(pixel), camera.piece(1), 0.0
+    for distance in distances:
+        image = second.project(ray.origin + distance * ray.direction)
+        shown = np.where(image.valid[:, :1], np.asarray(image.pixel)[:, 0], np.inf)
+        worst = max(worst, float(np.linalg.norm(shown - pixel, axis=1).max()))
+    return worst

@@ -7,23 +7,27 @@ from mpcam.cameras.pinhole import Pinhole
 from mpcam.math.pose import look_at
 
 _ABOVE, _RING, _FAN = 3.0, 0.3, 1.15
-_FOOT = (0.9, 2.4, 6.0)  # x of the neck, distance of the path from it, how far behind the body its slit is
-_REACH, _TURN = 3.1, 2.9
+_NECK, _AWAY = 1.0, 2.4
+"""x of the hinge, and how far the path is from the cow."""
+_FIRST, _SECOND = 3.2, 3.4
+"""Lengths of both paths."""
+_BEHIND = (6.0, 0.45)
+"""How far behind the middle of the cow both slits are."""
 
 
 def cow_around(width: int, height: int, pieces: int = 36) -> GeneralLinears:
     """All sides of the cow: the image begins and ends behind its tail."""
-    return GeneralLinears.around((0.1, 0, 1.0), 3.6, 3.2, width, height, pieces, turn=(-1.25 * np.pi, 0.75 * np.pi))
+    return GeneralLinears.around((0.1, 0, 1.0), 3.6, 2.9, width, height, pieces, turn=(-1.25 * np.pi, 0.75 * np.pi))
 
 
 def cow_eye(width: int, height: int) -> Pinhole:
-    return _pinhole(width, height, (1.9, -3.4, 1.9), (0.1, 0, 0.97), 42.0)
+    return _pinhole(width, height, (1.9, -3.4, 1.9), (0.25, 0, 0.97), 43.0)
 
 
 def teapot_around(width: int, height: int, pieces: int = 36) -> GeneralLinears:
     """Three quarters of the teapot's sides, with spout and handle."""
     turn = (-1.25 * np.pi, 0.25 * np.pi)
-    return GeneralLinears.around((0, 0, 0.55), 3.2, 1.9, width, height, pieces, turn=turn)
+    return GeneralLinears.around((0, 0, 0.55), 3.2, 2.6, width, height, pieces, turn=turn)
 
 
 def teapot_eye(width: int, height: int) -> Pinhole:
@@ -45,17 +49,17 @@ def teapot_top(width: int, height: int, tiles: int = 18) -> GeneralLinears:
 
 
 def hinged(width: int, height: int, angle: float) -> GeneralLinears:
-    """A cross-slit camera along body and tail of the cow, and one on a hinge beside its neck whose slit is the neck.
+    """A cross-slit camera along body and tail of the cow, and one on a hinge at its end, whose slit is behind the
+    neck.
 
     angle: degrees that the second path is turned out of the line of the first, toward the cow's face.
     """
-    x, away, behind = _FOOT
     turn = np.radians(angle)
-    hinge = np.array([x, -away, 1.15])
-    path = [hinge - (_REACH, 0, 0), hinge, hinge + _TURN * np.array([np.cos(turn), np.sin(turn), 0])]
-    slits = [(x, behind, 0.0), (x, 0.0, 0.0)]
-    first = round(0.62 * width)
-    return GeneralLinears.along_path(path, slits, width, height, (-0.62, 0.42), columns=[first, width - first])
+    hinge = np.array([_NECK, -_AWAY, 1.15])
+    path = [hinge - (_FIRST, 0, 0), hinge, hinge + _SECOND * np.array([np.cos(turn), np.sin(turn), 0])]
+    first = round(0.66 * width)
+    slits = [(_NECK, behind, 0.0) for behind in _BEHIND]
+    return GeneralLinears.along_path(path, slits, width, height, (-0.6, 0.45), columns=[first, width - first])
 
 
 def _pinhole(width: int, height: int, eye: tuple, target: tuple, degrees: float) -> Pinhole:
