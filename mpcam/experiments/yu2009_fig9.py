@@ -18,8 +18,8 @@ from mpcam.rendering.methods import prepare
 from mpcam.rendering.shade import shade
 
 FRAMES = 32
-MIDDLE, SWING = 36.0, 26.0
-"""Degrees of the second path out of the line of the first: from 10, away from the face, to 62, toward it."""
+MIDDLE, SWING = 36.0, 24.0
+"""Degrees of the second path out of the line of the first: from 12, away from the face, to 60, toward it."""
 PATCH = 10
 ROUNDS = 9
 DEPTHS = (1.0, 2.1, 2.35)

@@ -1,6 +1,6 @@
 """The figures that Yu et al. 2009 print for Figs. 5 to 7 and 9, and how they compare with ours."""
 
-PAPER = "Yu, Yu, McMillan: Multi-perspective rendering with general linear cameras, The Visual Computer 2009"
+PAPER = "Yu, Yu, McMillan: Towards multi-perspective rasterization, The Visual Computer 2009"
 CARD = "Frame rates are not to be compared: the paper's are of an NVidia 8800 GTX."
 STAND_IN = "The scenes are procedural stand-ins: the paper's models are not public."
 PATCHES = (5, 10, 20)
