@@ -21,7 +21,7 @@ from mpcam.io.images import write_image
 from mpcam.math.srgb import linear_from_srgb
 
 PAGE, RESULTS = "report.html", "results.json"
-_LISTED = re.compile(r"(?:images/)?[a-z0-9.-]+\.(?:png|csv)")
+_LISTED = re.compile(r"(?:images/)?[a-z0-9.-]+\.(?:png|gif|csv)")
 
 
 def check_output(output: str | Path) -> None:

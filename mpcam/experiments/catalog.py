@@ -51,6 +51,21 @@ EXPERIMENTS = {
             "Hou et al. 2006, Fig. 7: many moving objects around a teapot, with and without each acceleration",
         ),
         Experiment(
+            "yu2009-fig5",
+            "yu2009_fig5",
+            "Yu et al. 2009, Fig. 5: a cross-slit camera by two passes of several patches, and by ray tracing",
+        ),
+        Experiment(
+            "yu2009-fig6-fig7",
+            "yu2009_fig6_fig7",
+            "Yu et al. 2009, Figs. 6 and 7: panoramas of things from all sides, by number of pieces; a top view",
+        ),
+        Experiment(
+            "yu2009-fig9",
+            "yu2009_fig9",
+            "Yu et al. 2009, Fig. 9: a still animal turns its head, by two cross-slit cameras on a hinge",
+        ),
+        Experiment(
             "leaving-out",
             "leaving_out",
             "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",

@@ -1,10 +1,13 @@
-"""Plots of experiments, drawn once for light and once for dark pages."""
+"""Plots of experiments, drawn once for light and once for dark pages, and pictures that move."""
 
 import io
 from dataclasses import dataclass
 from typing import Any
 
-from mpcam.experiments.results import Plot
+import numpy as np
+
+from mpcam.experiments.results import Picture, Plot
+from mpcam.math.srgb import srgb_from_linear
 
 DPI = 150
 
@@ -83,6 +86,23 @@ def _saved(plot: Plot, theme: Theme, **how: Any) -> bytes:
         plot.draw(figure, theme)
         out = io.BytesIO()
         figure.savefig(out, **how)
+    return out.getvalue()
+
+
+def gif(picture: Picture, shrink: int = 1) -> bytes:
+    """The frames of a picture as a GIF that runs without end, `shrink` times smaller, all with one palette."""
+    from PIL import Image
+
+    bytes_ = [
+        np.rint(255 * srgb_from_linear(np.asarray(frame, np.float64))).astype(np.uint8) for frame in picture.frames
+    ]
+    images = [Image.fromarray(frame).reduce(shrink) for frame in bytes_]
+    rows = np.concatenate([np.asarray(image)[::4, ::4] for image in images])
+    palette = Image.fromarray(rows).quantize(256)
+    flat = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    out = io.BytesIO()
+    each = round(1000 * picture.seconds)
+    flat[0].save(out, "GIF", save_all=True, append_images=flat[1:], duration=each, loop=0, optimize=False)
     return out.getvalue()
 
 

@@ -7,7 +7,8 @@ from importlib.resources import files
 from itertools import groupby
 
 from mpcam.comparison.report import data_uri, fill, page_part
-from mpcam.experiments.results import Column, Gallery, Plot, Report, Table, shown
+from mpcam.experiments.figures import gif
+from mpcam.experiments.results import Column, Gallery, Picture, Plot, Report, Table, shown
 
 Drawn = Mapping[str, tuple[bytes, bytes]]
 WIDEST = 640  # pixels of a picture in the page; wider ones are shown smaller, their PNG files are whole
@@ -109,11 +110,17 @@ def _gallery(gallery: Gallery) -> str:
         size = f'width="{width}" height="{height}"'
         caption = html.escape(picture.caption)
         figures.append(
-            f'<figure><img {size} alt="{caption}" src="{data_uri(picture.image, shrink)}">'
+            f'<figure><img {size} alt="{caption}" src="{_picture_uri(picture, shrink)}">'
             f'<figcaption class="help">{caption}</figcaption></figure>'
         )
     title = html.escape(gallery.title)
     return f'<section><h2>{title}</h2><div class="gallery">{"".join(figures)}</div>{_note(gallery.note)}</section>'
+
+
+def _picture_uri(picture: Picture, shrink: int) -> str:
+    if not picture.frames:
+        return data_uri(picture.image, shrink)
+    return "data:image/gif;base64," + base64.b64encode(gif(picture, shrink)).decode("ascii")
 
 
 def _note(text: str) -> str:

@@ -76,11 +76,17 @@ class Plot:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """An image, linear RGB (H, W, 3), with its caption. name: of its PNG file, without the suffix."""
+    """An image, linear RGB (H, W, 3), with its caption. name: of its PNG file, without the suffix.
+
+    frames: images of that size, to be shown one after another, at `seconds` each and without end, in place of the one;
+    they become a GIF file of the same name.
+    """
 
     name: str
     caption: str
     image: np.ndarray = field(repr=False)
+    frames: tuple[np.ndarray, ...] = field(default=(), repr=False)
+    seconds: float = 0.08
 
 
 @dataclass(frozen=True)
