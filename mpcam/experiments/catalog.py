@@ -51,6 +51,21 @@ EXPERIMENTS = {
             "Hou et al. 2006, Fig. 7: many moving objects around a teapot, with and without each acceleration",
         ),
         Experiment(
+            "yu2009-fig1",
+            "yu2009_fig1",
+            "Yu et al. 2009, Fig. 1: a cross-slit strip along a moving city, against rebuilding a tree and tracing",
+        ),
+        Experiment(
+            "yu2009-fig8",
+            "yu2009_fig8",
+            "Yu et al. 2009, Fig. 8: a mirror sphere of general linear cameras among butterflies; errors and seams",
+        ),
+        Experiment(
+            "yu2009-fig10",
+            "yu2009_fig10",
+            "Yu et al. 2009, Fig. 10: mirrors by numbers of cameras and scene triangles; the cost of one more camera",
+        ),
+        Experiment(
             "leaving-out",
             "leaving_out",
             "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",
