@@ -111,7 +111,7 @@ def curve_plot(rows: Rows, fits: Rows) -> Plot:
 
     caption = (
         "Time of a moving frame against the number of cameras, the scene (1,100 triangles) and the pixels in all "
-        "fixed; lines: fits of fixed work and a cost of each camera over all points. The paper's own times, of images of "
-        "128 pixels for each camera, are of another machine."
+        "fixed; lines: fits of fixed work and a cost of each camera over all points. The paper's own times, with 128 "
+        "pixels along a side of each camera, are of another machine."
     )
     return Plot("curve", caption, "Times against the number of cameras by method, with fitted curves", draw)
