@@ -51,6 +51,11 @@ EXPERIMENTS = {
             "Hou et al. 2006, Fig. 7: many moving objects around a teapot, with and without each acceleration",
         ),
         Experiment(
+            "yu2009-fig1",
+            "yu2009_fig1",
+            "Yu et al. 2009, Fig. 1: a cross-slit strip along a moving city, against rebuilding a tree and tracing",
+        ),
+        Experiment(
             "yu2009-fig5",
             "yu2009_fig5",
             "Yu et al. 2009, Fig. 5: a cross-slit camera by two passes of several patches, and by ray tracing",
@@ -61,9 +66,19 @@ EXPERIMENTS = {
             "Yu et al. 2009, Figs. 6 and 7: panoramas of things from all sides, by number of pieces; a top view",
         ),
         Experiment(
+            "yu2009-fig8",
+            "yu2009_fig8",
+            "Yu et al. 2009, Fig. 8: a mirror sphere of general linear cameras among butterflies; errors and seams",
+        ),
+        Experiment(
             "yu2009-fig9",
             "yu2009_fig9",
             "Yu et al. 2009, Fig. 9: a still animal turns its head, by two cross-slit cameras on a hinge",
+        ),
+        Experiment(
+            "yu2009-fig10",
+            "yu2009_fig10",
+            "Yu et al. 2009, Fig. 10: mirrors by numbers of cameras and scene triangles; the cost of one more camera",
         ),
         Experiment(
             "leaving-out",
