@@ -119,7 +119,7 @@ def test_grazing_triangles_are_left_out_and_said(direct):
     kept = (slant > 1e-6).all(axis=0) | (slant < -1e-6).all(axis=0)
     assert 0.5 < kept.mean() < 1 and cams.count == kept.sum()
     assert (cams.faces == direct["sphere"].faces[kept]).all()
-    assert cams.pieces.count == cams.count
+    assert cams.pieces is not None and cams.pieces.count == cams.count
     assert mp.CameraTriangles.__name__ in repr(type(cams))
 
 

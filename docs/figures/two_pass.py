@@ -1,5 +1,7 @@
 """What the second pass of two-pass rasterization draws: samples of two triangles, as small triangles."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib import pyplot
 
@@ -14,7 +16,7 @@ def draw(theme):
     mesh = mp.Mesh(corners, [[0, 1, 2], [0, 2, 3]])
     figure, panels = pyplot.subplots(1, 3, figsize=(theme.width, 2.1), sharex=True, sharey=True)
     for axes, patch in zip(panels, (3, 5, 10), strict=True):
-        prepared = mp.prepare(camera, mesh, "two_pass", patch=patch)
+        prepared: Any = mp.prepare(camera, mesh, "two_pass", patch=patch)
         exact = mp.rasterize(camera, mesh).mask
         rows = np.asarray(prepared.place(prepared.vertices)[0].numpy()).reshape(-1, 4)
         faces = np.asarray(prepared.faces.numpy()).reshape(-1, 3)

@@ -49,7 +49,9 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     scene, camera, known = solids_scene(), cross_slit(width, height), cases()
     mesh = scene.mesh
     steps = StepCounter(progress, len(known) + 2 * len(known) * (1 + WARMUP + count) + 1)
-    rows, pictures, truth, true_image = [], [], None, None
+    rows, pictures = [], []
+    truth: Any = None
+    true_image: Any = None
     calls: dict[str, Callable[[], object]] = {}
     moving = moving_vertices(mesh)
     for label, (method, settings) in known.items():
