@@ -158,16 +158,16 @@ def _reading(rows: Rows) -> str:
     holes = sum(row["holes"] for row in patches)
     falls = " to ".join(f"{row['rmse']:.2g}" for row in (patches[0], patches[-1]))
     wrong = " to ".join(f"{row['wrong_percent']:.2g}" for row in (patches[0], patches[-1]))
-    finest = vertices[-1]
+    split, level = paper.PATCHES[0] - 1, vertices[2]
     least, most = (f"{row['moving_ratio']:.2g}" for row in (patches[0], patches[-1]))
     ground, gained = min(row["ground_percent"] for row in patches), f"{invert['moving_ratio']:.2g}"
     return (
         f"With {paper.PATCHES[0]} to {paper.PATCHES[-1]} samples along a side of a triangle the picture's error falls "
-        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.0f} % "
-        "of the squared error is on the ground, whose two triangles are the largest, as the paper says. "
+        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.1f} % of the squared error is on the ground, "
+        "where the paper sees it, too: its two triangles are the largest. "
         f"{'No' if holes == 0 else holes} pixels stay uncovered inside closed outlines. Inverting per pixel has "
-        f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding "
-        f"a tree and tracing; two passes take {least} to {most}. Projected vertices with edges split into "
-        f"{2 ** LEVELS[-1]} have an error of {finest['rmse']:.2g}: a patch of n samples shows what edges split into "
-        f"n - 1 do, and costs as much. {paper.STAND_IN} {paper.CARD}"
+        f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding a tree and "
+        f"tracing; two passes take {least} to {most}. Projected vertices with edges split into {split} have an error of "
+        f"{level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same small "
+        f"triangles. {paper.STAND_IN} {paper.CARD}"
     )

@@ -32,7 +32,8 @@ def holes(found: np.ndarray, expected: np.ndarray) -> int:
     """Pixels that nothing covers, in patches without any pixel where ray tracing, too, hits nothing."""
     from scipy.ndimage import label
 
-    patches, count = label(~found, np.ones((3, 3)))  # pyright: ignore[reportGeneralTypeIssues]
+    labelled: Any = label(~found, np.ones((3, 3)))
+    patches, count = labelled
     background = np.zeros(count + 1, bool)
     background[patches[~expected]] = True
     return int(np.count_nonzero(~found & ~background[patches]))
