@@ -163,11 +163,11 @@ def _reading(rows: Rows) -> str:
     ground, gained = min(row["ground_percent"] for row in patches), f"{invert['moving_ratio']:.2g}"
     return (
         f"With {paper.PATCHES[0]} to {paper.PATCHES[-1]} samples along a side of a triangle the picture's error falls "
-        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.1f} % of the squared error is on the ground, "
-        "where the paper sees it, too: its two triangles are the largest. "
+        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.1f} % of the squared error is on the "
+        "ground, where the paper sees it, too: its two triangles are the largest. "
         f"{'No' if holes == 0 else holes} pixels stay uncovered inside closed outlines. Inverting per pixel has "
         f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding a tree and "
-        f"tracing; two passes take {least} to {most}. Projected vertices with edges split into {split} have an error of "
-        f"{level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same small "
+        f"tracing; two passes take {least} to {most}. Projected vertices with edges split into {split} have an "
+        f"error of {level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same small "
         f"triangles. {paper.STAND_IN} {paper.CARD}"
     )
