@@ -49,14 +49,16 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     scene, camera, known = solids_scene(), cross_slit(width, height), cases()
     mesh = scene.mesh
     steps = StepCounter(progress, len(known) + 2 * len(known) * (1 + WARMUP + count) + 1)
-    rows, pictures, truth, true_image = [], [], None, None
+    rows, pictures = [], []
+    seen: list[tuple[Any, np.ndarray]] = []  # by ray tracing
     calls: dict[str, Callable[[], object]] = {}
     moving = moving_vertices(mesh)
     for label, (method, settings) in known.items():
         still = prepare(camera, mesh, method, **settings)
         hits = still.frame()
         image = shade(hits, scene, "light")
-        truth, true_image = (hits, image) if truth is None else (truth, true_image)
+        seen = seen or [(hits, image)]
+        truth, true_image = seen[0]
         row = {"method": label, "family": method} | errors(hits, truth, image, true_image)
         rows.append(row | {"ground_percent": _on_ground(image, true_image, truth)})
         pictures.append(Picture(label.replace(" × ", "-").replace(", ", "-").replace(" ", "-").lower(), label, image))
@@ -168,6 +170,6 @@ def _reading(rows: Rows) -> str:
         f"{'No' if holes == 0 else holes} pixels stay uncovered inside closed outlines. Inverting per pixel has "
         f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding a tree and "
         f"tracing; two passes take {least} to {most}. Projected vertices with edges split into {split} have an "
-        f"error of {level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same small "
-        f"triangles. {paper.STAND_IN} {paper.CARD}"
+        f"error of {level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same "
+        f"small triangles. {paper.STAND_IN} {paper.CARD}"
     )
