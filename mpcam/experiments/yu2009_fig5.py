@@ -50,15 +50,15 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     mesh = scene.mesh
     steps = StepCounter(progress, len(known) + 2 * len(known) * (1 + WARMUP + count) + 1)
     rows, pictures = [], []
-    truth: Any = None
-    true_image: Any = None
+    seen: list[tuple[Any, np.ndarray]] = []  # by ray tracing
     calls: dict[str, Callable[[], object]] = {}
     moving = moving_vertices(mesh)
     for label, (method, settings) in known.items():
         still = prepare(camera, mesh, method, **settings)
         hits = still.frame()
         image = shade(hits, scene, "light")
-        truth, true_image = (hits, image) if truth is None else (truth, true_image)
+        seen = seen or [(hits, image)]
+        truth, true_image = seen[0]
         row = {"method": label, "family": method} | errors(hits, truth, image, true_image)
         rows.append(row | {"ground_percent": _on_ground(image, true_image, truth)})
         pictures.append(Picture(label.replace(" × ", "-").replace(", ", "-").replace(" ", "-").lower(), label, image))
@@ -160,16 +160,16 @@ def _reading(rows: Rows) -> str:
     holes = sum(row["holes"] for row in patches)
     falls = " to ".join(f"{row['rmse']:.2g}" for row in (patches[0], patches[-1]))
     wrong = " to ".join(f"{row['wrong_percent']:.2g}" for row in (patches[0], patches[-1]))
-    finest = vertices[-1]
+    split, level = paper.PATCHES[0] - 1, vertices[2]
     least, most = (f"{row['moving_ratio']:.2g}" for row in (patches[0], patches[-1]))
     ground, gained = min(row["ground_percent"] for row in patches), f"{invert['moving_ratio']:.2g}"
     return (
         f"With {paper.PATCHES[0]} to {paper.PATCHES[-1]} samples along a side of a triangle the picture's error falls "
-        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.0f} % "
-        "of the squared error is on the ground, whose two triangles are the largest, as the paper says. "
+        f"from {falls}, and wrong pixels from {wrong} %; at least {ground:.1f} % of the squared error is on the "
+        "ground, where the paper sees it, too: its two triangles are the largest. "
         f"{'No' if holes == 0 else holes} pixels stay uncovered inside closed outlines. Inverting per pixel has "
-        f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding "
-        f"a tree and tracing; two passes take {least} to {most}. Projected vertices with edges split into "
-        f"{2 ** LEVELS[-1]} have an error of {finest['rmse']:.2g}: a patch of n samples shows what edges split into "
-        f"n - 1 do, and costs as much. {paper.STAND_IN} {paper.CARD}"
+        f"{invert['wrong_percent']:.2g} % wrong pixels and takes {gained} of the time of rebuilding a tree and "
+        f"tracing; two passes take {least} to {most}. Projected vertices with edges split into {split} have an "
+        f"error of {level['rmse']:.2g}, beside {patches[0]['rmse']:.2g} of a patch of {split + 1} samples: the same "
+        f"small triangles. {paper.STAND_IN} {paper.CARD}"
     )

@@ -31,7 +31,7 @@ def teapot_around(width: int, height: int, pieces: int = 36) -> GeneralLinears:
 
 
 def teapot_eye(width: int, height: int) -> Pinhole:
-    return _pinhole(width, height, (0.9, -3.9, 1.5), (0, 0, 0.52), 36.0)
+    return _pinhole(width, height, (0.9, -3.9, 1.5), (0.1, 0, 0.52), 43.0)
 
 
 def teapot_top(width: int, height: int, tiles: int = 18) -> GeneralLinears:
