@@ -41,8 +41,7 @@ def test_numbers_of_triangles_that_cannot_be_are_refused():
 def test_the_strip_is_seen_through_two_slits():
     camera = yu2009_city.strip_camera()
     assert camera.kind == "cross_slit"
-    for line, z in zip(camera.slits, camera.domain.slits, strict=True) if hasattr(camera.domain, "slits") else ():
-        assert np.isfinite(line.point).all() and np.isfinite(z)
+    assert len(camera.slits) == 2
     moved = yu2009_city.strip_camera(8.0)
     near, far = camera.project(np.array([0.0, 0.0, 3.0])), moved.project(np.array([8.0, 0.0, 3.0]))
     np.testing.assert_allclose(near.pixel, far.pixel, atol=1e-6)

@@ -199,8 +199,9 @@ def _reading(rows: Rows) -> str:
     return (
         f"With all vertices moving, invert takes {ours['moving_ms']:.3g} ms ({frames}) against "
         f"{ours['moving_trace_ms']:.3g} ms for rebuilding a tree and tracing: {ours['moving_ratio']:.2f} of the time, "
-        f"where at most 0.5 was wanted, which is {met}. {rest}. Of a still frame invert takes {ours['still_ratio']:.2f} "
-        "of Mitsuba's time, whose tree is then there, and where the camera travels along the still street, "
+        f"where at most 0.5 was wanted, which is {met}. {rest}. Of a still frame invert takes "
+        f"{ours['still_ratio']:.2f} of Mitsuba's time, whose tree is then there, and where the camera travels "
+        "along the still street, "
         f"{ours['aimed_ratio']:.2f}. Pixels of invert: {wrong_pixels(ours['wrong_percent'])} {paper.CARD} "
         f"{paper.STAND_IN}"
     )
