@@ -41,7 +41,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     width, height = (128, 40) if quick else (1024, 320)
     steps = StepCounter(progress, 2 + len(methods) * (1 + 6 * (1 + WARMUP + count)) + 1)
     scene = city_scene(width=width, height=height)
-    maps = shadow_maps(scene, 256 if quick else 4096)
+    maps = () if quick else shadow_maps(scene, 4096)
     steps.done("the city")
     true_hits = prepare(scene.camera, scene.mesh, "raytrace").frame()
     true_image = shade(true_hits, scene, "light", maps)
