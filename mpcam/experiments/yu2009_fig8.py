@@ -69,7 +69,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
             count,
             truth="Mitsuba: rays from the exact points and normals of the sphere, the same shading",
             FLIP_and_PSNR="over the pixels of the sphere that nothing hides; LDR-FLIP, mean; PSNR in sRGB",
-            middle=f"the same within {MIDDLE} of the sphere's radius in the picture, where no camera is left out",
+            middle=f"the same within {MIDDLE} of the sphere's radius in the picture, away from the rim",
             ray_error="distance of rays from the true ones where they are two radii of the sphere away from it",
             seam="a ray of one side at a common edge is followed for two radii; the jump is how far off the other "
             "side, continued, shows the point where it ends, in pixels of the picture; at four places on each edge",
