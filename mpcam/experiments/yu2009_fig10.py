@@ -42,7 +42,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
     sizes = [(n, side) for n in COUNTS for side in SIDES if n * side * (side + 1) // 2 <= MOST_PIXELS]
     sizes = [(150, 8)] if quick else sizes
     of_scenes = [(n, patch) for n in (SCENES[:1] if quick else SCENES) for patch in PATCHES[: 1 if quick else 2]]
-    curve = (30, 120) if quick else CURVE
+    curve = (20, 80) if quick else CURVE
     per = 1 + WARMUP + number["tables"]
     total = len(sizes) * (1 + 2 * per) + len(of_scenes) * (1 + 2 * per)
     total += len(curve) * (2 + 2 * (1 + WARMUP + number["curve"]) + (1 + WARMUP + number["curve_two_pass"])) + 1
@@ -53,7 +53,7 @@ def run(repeats: int | None = None, quick: bool = False, progress: Progress | No
         | {"wanted": n, "image": side, "paper_fps": paper.FIG_10_CAMERAS.get((n, side))}
         for n, side in sizes
     ]
-    fixed, by_scene = with_side(sphere_of(scene, 150 if quick else CAMERAS), 8 if quick else IMAGE), []
+    fixed, by_scene = with_side(found[150] if quick else sphere_of(scene, CAMERAS), 8 if quick else IMAGE), []
     for triangles, patch in of_scenes:
         row = _row(butterfly_scene(triangles), fixed, patch, number["tables"], steps)
         by_scene.append(row | {"patch": patch, "paper_fps": paper.FIG_10_SCENES[triangles, patch]})
