@@ -25,7 +25,7 @@ def error_table(rows: Rows) -> Table:
         Column("cameras", "Kept", "", "", "Cameras"),
         Column("left_out", "Left out", "", "At grazing incidence.", "Cameras"),
         Column("flip", "FLIP", "", "Mean over the sphere's pixels; 0 is the truth.", picture),
-        Column("flip_middle", "Middle", "", "FLIP of the sphere's middle.", picture),
+        Column("flip_middle", "Middle", "", "FLIP of the sphere's middle.", picture, brief=False),
         Column("psnr", "PSNR", "dB", "Over the sphere's pixels.", picture, brief=False),
         Column("ray_rms", "rms", "m", "Two radii away.", rays),
         Column("ray_median", "Median", "m", "Two radii away.", rays, brief=False),
@@ -38,7 +38,7 @@ def error_table(rows: Rows) -> Table:
         Column("seam_above", "Above 0.5 px", "%", "Of the places.", seam, brief=False),
         Column("seam_places", "Places", "", "Four on each common edge.", seam, brief=False),
         Column("seam_lost", "Without", "", "Places where the other side shows no such point.", seam, brief=False),
-        Column("still_ms", "Still", "ms", "Median, whole picture.", "Time"),
+        Column("still_ms", "Still", "ms", "Median, whole picture.", "Time", brief=False),
         Column("moving_ms", "Moving", "ms", "Median, whole picture.", "Time"),
     )
     note = "general_linear: the paper's, each in its own plane; directions: Hou et al. 2006; normals: bent by pixel."
