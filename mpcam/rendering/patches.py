@@ -159,11 +159,17 @@ def sorted_out(sampler: Any, pair: Any, data: Any, areas: Any, vertices: Any, fa
     for near, far in sampler.planes(data, piece):
         seen = seen | ((high >= near) & (low <= far))
         whole = whole | ((low >= near) & (high <= far))
-    seen = seen & finite
-    if areas is not None:
-        area = [dr.gather(t.Float, table, piece) for table in areas]
-        seen = seen & sampler.may_show(data, piece, area, points)
+    seen = seen & finite & _may_show(sampler, piece, data, areas, points)
     return dr.select(seen, dr.select(whole, t.UInt(1), 2), 0)
+
+
+def _may_show(sampler: Any, piece: Any, data: Any, areas: Any, points: list[Any]) -> Any:
+    """Whether a triangle may show in its piece; areas: of all pieces, or None where there is one."""
+    import drjit as dr
+
+    if areas is None:
+        return types().Bool(True)
+    return sampler.may_show(data, piece, [dr.gather(types().Float, table, piece) for table in areas], points)
 
 
 def most_parts(sampler: Any) -> int:
@@ -173,9 +179,12 @@ def most_parts(sampler: Any) -> int:
     return slabs.FANS * sampler.zones
 
 
-def parts_of(sampler: Any, item: Any, pairs: Any, data: Any, vertices: Any, faces: Any, triangles: int) -> Any:
-    """Whether the parts of pairs that are cut, `most_parts` of each, are there at all."""
-    return _part(sampler, item, pairs, data, vertices, faces, triangles)[2]
+def parts_of(
+    sampler: Any, item: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any, triangles: int
+) -> Any:
+    """Whether the parts of pairs that are cut, `most_parts` of each, are there and may show in their piece."""
+    piece, corners, there = _part(sampler, item, pairs, data, vertices, faces, triangles)
+    return there & _may_show(sampler, piece, data, areas, [corner.point for corner in corners])
 
 
 def set_up(

@@ -166,7 +166,9 @@ class TwoPass(ZBuffered):
         if lanes == 0:
             return types().UInt()
         there = _frozen_parts(self.sampler, self.mesh.triangle_count)
-        parts = types().UInt(dr.compress(there(threads(types(), 0, lanes), cut, self.data, vertices, self.corners)))
+        parts = types().UInt(
+            dr.compress(there(threads(types(), 0, lanes), cut, self.data, self.areas, vertices, self.corners))
+        )
         dr.eval(parts)
         return parts
 
@@ -262,8 +264,8 @@ def _frozen_parts(sampler: Any, triangles: int) -> Any:
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def there(item: Any, pairs: Any, data: Any, vertices: Any, faces: Any) -> Any:
-        return patches.parts_of(sampler, item, pairs, data, vertices, faces, triangles)
+    def there(item: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any) -> Any:
+        return patches.parts_of(sampler, item, pairs, data, areas, vertices, faces, triangles)
 
     return there
 
