@@ -180,11 +180,16 @@ def most_parts(sampler: Any) -> int:
 
 
 def parts_of(
-    sampler: Any, item: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any, triangles: int
+    sampler: Any, item: Any, parts: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any, triangles: int
 ) -> Any:
-    """Whether the parts of pairs that are cut, `most_parts` of each, are there and may show in their piece."""
-    piece, corners, there = _part(sampler, item, pairs, data, vertices, faces, triangles)
-    return there & _may_show(sampler, piece, data, areas, [corner.point for corner in corners])
+    """Whether the parts of pairs that are cut, `most_parts` of each, are there (parts: None), or may show (numbers)."""
+    import drjit as dr
+
+    part = item if parts is None else dr.gather(types().UInt, parts, item)
+    piece, corners, there = _part(sampler, part, pairs, data, vertices, faces, triangles)
+    if parts is None:
+        return there
+    return _may_show(sampler, piece, data, areas, [corner.point for corner in corners])
 
 
 def set_up(

@@ -162,13 +162,16 @@ class TwoPass(ZBuffered):
 
         from mpcam_kernels.threads import threads
 
+        t = types()
         lanes = dr.width(cut) * patches.most_parts(self.sampler)
         if lanes == 0:
-            return types().UInt()
-        there = _frozen_parts(self.sampler, self.mesh.triangle_count)
-        parts = types().UInt(
-            dr.compress(there(threads(types(), 0, lanes), cut, self.data, self.areas, vertices, self.corners))
-        )
+            return t.UInt()
+        there, scene = _frozen_parts(self.sampler, self.mesh.triangle_count), (vertices, self.corners)
+        parts = t.UInt(dr.compress(there(threads(t, 0, lanes), None, cut, self.data, None, *scene)))
+        if self.areas is not None and dr.width(parts):
+            shown = there(threads(t, 0, dr.width(parts)), parts, cut, self.data, self.areas, *scene)
+            shown = t.UInt(dr.compress(shown))
+            parts = dr.gather(t.UInt, parts, shown) if dr.width(shown) else t.UInt()
         dr.eval(parts)
         return parts
 
@@ -264,8 +267,8 @@ def _frozen_parts(sampler: Any, triangles: int) -> Any:
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def there(item: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any) -> Any:
-        return patches.parts_of(sampler, item, pairs, data, areas, vertices, faces, triangles)
+    def there(item: Any, parts: Any, pairs: Any, data: Any, areas: Any, vertices: Any, faces: Any) -> Any:
+        return patches.parts_of(sampler, item, parts, pairs, data, areas, vertices, faces, triangles)
 
     return there
 
