@@ -272,8 +272,7 @@ class Makers:
                 *(((0.0, 0.0, near), (1.0, 0.2, 0.0)), ((0.1, 0.0, far), (-0.1, 1.0, 0.0))),
                 *((0.0, 0.0, 3.0), 3.0, (0.0, -1.0, 0.0)),
             )
-            frame = made.camera_from_world if pose is None else made.camera_from_world @ np.asarray(pose)  # type: ignore[attr-defined]
-            return made.with_pose(frame)  # type: ignore[attr-defined]
+            return made.with_pose(pose)  # type: ignore[attr-defined]
 
         return {
             "pinhole": cls.pinhole(width, height, focal, 0.95 * focal, camera_from_world=pose),
