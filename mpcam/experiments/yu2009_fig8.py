@@ -1,7 +1,6 @@
 """Yu et al. 2009, Fig. 8: a mirror sphere of 960 general linear cameras among butterflies, beside other rays."""
 
 import warnings
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,14 @@ from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.hou2006_scenes import smaller
 from mpcam.experiments.results import Report
 from mpcam.experiments.yu2009_butterfly import RADIUS, TRIANGLES, butterfly_scene
-from mpcam.experiments.yu2009_fig8_pages import closeups, error_table, gallery, seam_plot, time_table
+from mpcam.experiments.yu2009_fig8_pages import (
+    SpherePicture,
+    closeups,
+    error_table,
+    gallery,
+    seam_plot,
+    time_table,
+)
 from mpcam.experiments.yu2009_seams import seam_jumps
 from mpcam.rendering.methods import prepare
 from mpcam.scene.scene import Scene
@@ -30,16 +36,6 @@ RESOLUTION, ROUNDS = 48, 9
 MIDDLE = 0.85
 """Part of the sphere's picture, in radii, that counts as its middle."""
 Rows = list[dict[str, Any]]
-
-
-@dataclass(frozen=True, eq=False)
-class SpherePicture:
-    """The sphere with one kind of rays: its row, its picture, what makes frames, and jumps at seams, in pixels."""
-
-    row: dict[str, Any]
-    image: np.ndarray
-    picture: Reflection
-    jumps: np.ndarray
 
 
 def run(repeats: int | None = None, quick: bool = False, progress: Progress | None = None) -> Report:

@@ -1,19 +1,28 @@
 """Tables, plots and pictures of Yu et al. 2009, Fig. 8."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mpcam.comparison.metrics import flip_map
+from mpcam.effects.reflection import Reflection
 from mpcam.experiments import yu2009_paper_mirrors as paper
 from mpcam.experiments.figures import plain_ticks
 from mpcam.experiments.hou2006_fig6_pages import heat
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Table
 
-if TYPE_CHECKING:
-    from mpcam.experiments.yu2009_fig8 import SpherePicture
-
 Rows = list[dict[str, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class SpherePicture:
+    """The sphere with one kind of rays: its row, its picture, what makes frames, and jumps at seams, in pixels."""
+
+    row: dict[str, Any]
+    image: np.ndarray
+    picture: Reflection
+    jumps: np.ndarray
 
 
 def error_table(rows: Rows) -> Table:
@@ -57,7 +66,7 @@ def time_table(rows: Rows) -> Table:
     return Table("hits", "First hits of the general linear cameras", columns, tuple(rows), paper.CARD)
 
 
-def seam_plot(shown: "list[SpherePicture]") -> Plot:
+def seam_plot(shown: list[SpherePicture]) -> Plot:
     """How jumps at seams are distributed."""
     kept = [one for one in shown if len(one.jumps)]
 
@@ -80,7 +89,7 @@ def seam_plot(shown: "list[SpherePicture]") -> Plot:
     return Plot("seams", caption, "Curves of the share of places against the jump, by kind of rays", draw, height=3.6)
 
 
-def gallery(shown: "list[SpherePicture]") -> Gallery:
+def gallery(shown: list[SpherePicture]) -> Gallery:
     """The truth and every kind of rays, each above its difference."""
     truth, pictures = shown[0], []
     cut = _around(truth.picture.mask)
@@ -94,7 +103,7 @@ def gallery(shown: "list[SpherePicture]") -> Gallery:
     return Gallery("The sphere: Fig. 8", (whole, *pictures), note)
 
 
-def closeups(shown: "list[SpherePicture]") -> Gallery:
+def closeups(shown: list[SpherePicture]) -> Gallery:
     """A part near the rim, magnified: Fig. 8 (c)."""
     rows, columns = _around(shown[0].picture.mask)
     high, wide = rows.stop - rows.start, columns.stop - columns.start
@@ -110,11 +119,11 @@ def closeups(shown: "list[SpherePicture]") -> Gallery:
     return Gallery("Closer: seams, and what is left out at the rim", pictures)
 
 
-def _label(one: "SpherePicture") -> str:
+def _label(one: SpherePicture) -> str:
     return f"{one.row['rays']}, {one.row['method']}"
 
 
-def _name(one: "SpherePicture") -> str:
+def _name(one: SpherePicture) -> str:
     rays = one.row["rays"].replace("_", "-")
     return f"{rays}-two-pass" if one.row["method"] == "two_pass" else rays
 
