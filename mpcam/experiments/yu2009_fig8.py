@@ -20,7 +20,14 @@ from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.hou2006_scenes import smaller
 from mpcam.experiments.results import Report
 from mpcam.experiments.yu2009_butterfly import RADIUS, TRIANGLES, butterfly_scene
-from mpcam.experiments.yu2009_fig8_pages import SpherePicture, closeups, error_table, gallery, seam_plot, time_table
+from mpcam.experiments.yu2009_fig8_pages import (
+    SpherePicture,
+    closeups,
+    error_table,
+    gallery,
+    seam_plot,
+    time_table,
+)
 from mpcam.experiments.yu2009_seams import seam_jumps
 from mpcam.rendering.methods import prepare
 from mpcam.scene.scene import Scene
