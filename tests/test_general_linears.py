@@ -212,3 +212,13 @@ def test_equal_cameras_are_equal():
     again = MANY.around((0.5, -0.2, 0.3), 3.0, 2.0, 240, 100, 16)
     assert again == RING and dataclasses.replace(again, rays=np.asarray(again.rays) * 1.1) != RING
     assert repr(RING) == "GeneralLinears(240x100, 16 pieces)"
+
+
+def test_stress_cases_pass():
+    from mpcam.stress.general_linears import cameras, piece_rows
+
+    found = cameras()
+    for name in (next(iter(found)), "grid"):
+        rows = piece_rows(name, found[name], 6)
+        assert [row for row in rows if not row.good()] == []
+        assert sum(row.worst > 0 for row in rows) > 20 and any(row.count for row in rows if "other" in row.case)
