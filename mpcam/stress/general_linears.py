@@ -4,8 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.general_linear import GeneralLinear
 from mpcam.cameras.general_linears import GeneralLinears
 from mpcam.stress import general_linear as single
+from mpcam.stress.distant import SIZE as VIEW
+from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.general_linear import LIMIT as LIMIT
 from mpcam.stress.general_linear_truth import Truth
 from mpcam.stress.projections import rounded
@@ -62,10 +65,18 @@ def piece_rows(name: str, camera: GeneralLinears, count: int) -> Rows:
     return rows
 
 
+def narrow_view(distance: float, width: float) -> GeneralLinears:
+    """For distant eyes, as two halves: see `distant`."""
+    half, focal = VIEW // 2, focal_length(distance, width)
+    first = GeneralLinear.pinhole(half, VIEW, focal, cx=0.5 * VIEW)
+    second = GeneralLinear.pinhole(VIEW - half, VIEW, focal, cx=0.5 * VIEW - half)
+    return GeneralLinears.beside([first, second], pose(distance))
+
+
 def run(triangles: int = 30_000, points: int = 20, progress: Progress | None = None) -> Rows:
     """All cases: `points` per kind of point and piece. Raises InputError below 1."""
     check_counts(triangles=triangles, points=points)
     cases: list[Case] = [
         (name, lambda name=name, camera=camera: piece_rows(name, camera, points)) for name, camera in cameras().items()
     ]
-    return run_cases(cases, progress)
+    return run_cases([*cases, *distant_cases(narrow_view)], progress)
