@@ -1,6 +1,7 @@
 """Camera triangles: a mesh whose triangles are small cameras, with one ray at each vertex (Hou et al. 2006)."""
 
 import dataclasses
+import functools
 from typing import Any, ClassVar
 
 import numpy as np
@@ -152,7 +153,7 @@ class CameraTriangles(Camera):
         """Most images that a point has: image number n lies in camera triangle n // images_per_triangle."""
         return self.images_per_triangle * self.count
 
-    @property
+    @functools.cached_property
     def pieces(self) -> LinearPieces | None:
         """Camera triangles that are general linear, each in a frame on its own plane; None where they are not."""
         if not self.linear:

@@ -5,6 +5,7 @@ import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from mpcam.cameras.fields import Limits, Number, Positive
+from mpcam.cameras.general_linear_kinds import KINDS as ALL_KINDS
 from mpcam.errors import KeyProblem
 from mpcam.math import PI
 
@@ -12,9 +13,7 @@ Generator = tuple[float, float, float, float]
 Place = tuple[float, float]
 Point = tuple[float, float, float]
 Slit = tuple[Point, Point]
-KINDS = (
-    "pinhole", "orthographic", "pushbroom", "cross_slit", "pencil", "twisted_orthographic", "bilinear", "epi",
-)  # fmt: skip
+KINDS = tuple(kind for kind in ALL_KINDS if kind != "not a camera")
 _CROSSED = ("slits", "look", "extent", "top")
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, types
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.linear_pieces import LinearPieces, linear_pieces
 from mpcam.checks import whole_number
@@ -42,6 +42,7 @@ class TwoPass(ZBuffered):
         self.corners = self.faces  # of the whole triangles
         self.rows: list[Any] = []
 
+    @exclusive
     def aim(self, camera: Camera) -> None:
         """Another camera, or another pose of it: the scene stays as it is."""
         super().aim(camera)
@@ -54,34 +55,32 @@ class TwoPass(ZBuffered):
             half = camera.ray_geometry == "central" and camera.domain.image_radius is None
             half = half and wide is not None and wide <= 0.5 * PI
             unbounded = camera.domain.image_radius is None
-            self.sampler, self.data = _point_sampler(type(camera), half, unbounded), None
-        self._reframed()
+            self.sampler = _point_sampler(type(camera), half, unbounded)
+        self._place_camera()
 
     def _aim_pieces(self, camera: Any, pieces: LinearPieces) -> None:
         """What is the same for all poses of a camera of general linear pieces."""
-        import drjit as dr
-
-        t = types()
         self.pieces = pieces.count
         self.many = self.pieces > 1
         self.sampler = _linear_sampler(self.many)
         if not self.many:
             return
         self.test = "piece_triangle"
-        x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-        owner = camera.locate(x.ravel(), y.ravel()).astype(np.int64)
-        from mpcam_kernels import samples
-
-        index = dr.arange(t.UInt, dr.width(self.samples.pixels))
-        column, row, exists = samples.pixel_of(t, index, camera.width, camera.height)
-        name = dr.gather(t.Float, t.Float(owner.astype(np.float32)), row * camera.width + column, exists)
-        known = t.Array3f(self.samples.pixels.x, self.samples.pixels.y, name)
-        dr.eval(known)
-        self.samples = samples.Samples(known, self.samples.coarse, self.samples.parts)
-        self.areas = [t.Float(side.astype(np.float32)) for side in _areas(owner, x.ravel(), y.ravel(), self.pieces)]
+        kept = self.device_camera.kept  # the same for every pose
+        if "pieces" not in kept:
+            x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+            owner = camera.locate(x.ravel(), y.ravel()).astype(np.int64)
+            ends = _areas(owner, x.ravel(), y.ravel(), self.pieces)
+            areas = [_uploaded(side) for side in ends]
+            kept["pieces"] = _named(self.samples, owner, camera.width, camera.height), areas
+        self.samples, self.areas = kept["pieces"]
 
     def _reframed(self) -> None:
         super()._reframed()
+        self._place_camera()
+
+    def _place_camera(self) -> None:
+        """What the sampler reads: frames of pieces from device vertices, put together in float64, or the camera."""
         pieces, device = linear_pieces(self.camera), self.device
         if pieces is None:
             self.data = (self.device_camera.on_device, self.pose, self.unit)
@@ -95,7 +94,7 @@ class TwoPass(ZBuffered):
         linear = np.stack(np.broadcast_arrays(*pieces.linear)).reshape(12, -1)
         tables = np.concatenate([turned.reshape(9, -1), moved, linear])
         if self.many:
-            numbers = [types().Float(np.ascontiguousarray(row, np.float32)) for row in tables]
+            numbers = [_uploaded(row) for row in tables]
         else:
             numbers = opaque_numbers(tables[:, 0].tolist())
         self.data = (numbers, self.unit)
@@ -215,6 +214,25 @@ class TwoPass(ZBuffered):
         a, b = (dr.gather(t.Array4f, row, patch) for row in self.rows[-2:])
         mixed = (first * a.x + second * a.z + third * b.x, first * a.y + second * a.w + third * b.y)
         return tuple(dr.select(triangle >= 0, dr.clip(part, 0, 1), 0.0) for part in mixed)  # pyright: ignore[reportReturnType]
+
+
+def _named(planar: Any, owner: np.ndarray, width: int, height: int) -> Any:
+    """Samples of the image plane that carry the piece of their pixel, given row by row."""
+    import drjit as dr
+
+    from mpcam_kernels import samples
+
+    t = types()
+    column, row, exists = samples.pixel_of(t, dr.arange(t.UInt, dr.width(planar.pixels)), width, height)
+    name = dr.gather(t.Float, _uploaded(owner), row * width + column, exists)
+    pixels = t.Array3f(planar.pixels.x, planar.pixels.y, name)
+    dr.eval(pixels)
+    return samples.Samples(pixels, planar.coarse, planar.parts)
+
+
+def _uploaded(table: np.ndarray) -> Any:
+    """A table (N,) in Dr.Jit's own memory, as frozen kernels want it."""
+    return types().Float(np.ascontiguousarray(table, np.float32)) + opaque_zero()
 
 
 def opaque_whole(number: int) -> Any:
