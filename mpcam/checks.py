@@ -27,6 +27,17 @@ def reads_as_number(text: str) -> bool:
     return True
 
 
+def three_numbers(name: str, value: Any, hint: str = "") -> np.ndarray:
+    """The value as a new array (3,); raises InputError unless it is three finite numbers. hint: what else may be."""
+    try:
+        found = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise InputError(f"{name}={shown(value)}: give three finite numbers{hint}")
+    return found
+
+
 def whole_number(
     name: str, value: Any, low: int, high: int | None = None, *, of: str = "", unit: str = "", hint: str = ""
 ) -> int:

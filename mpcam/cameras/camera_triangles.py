@@ -11,6 +11,7 @@ from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.general_linear_map import linear_numbers
 from mpcam.cameras.linear_pieces import LinearPieces
 from mpcam.cameras.types import Domain, Projection, Ray
+from mpcam.checks import three_numbers
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, cross, dot, isfinite, library, normalize, plain, take, vector, where
 from mpcam.math.optics import reflect, refract
@@ -318,12 +319,7 @@ def _point(value: Any) -> Any:
         raise InputError("CameraTriangles: normals= needs eye=, the point (3,) that rays come from")
     if library(value) != "numpy" or type(value) is object:
         return value
-    try:
-        point = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        point = np.zeros(0)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise InputError(f"CameraTriangles: eye={value!r}: give three finite numbers")
+    point = three_numbers("CameraTriangles: eye", value)
     point.flags.writeable = False
     return point
 

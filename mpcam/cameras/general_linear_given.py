@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.checks import is_number, shown
+from mpcam.checks import is_number, shown, three_numbers
 from mpcam.errors import InputError
 
 
@@ -56,20 +56,10 @@ def a_slit(line: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
         point, direction = line
     except (TypeError, ValueError):
         raise InputError(f"cross_slit: {name}={shown(line)}: give a point (3,) and a direction (3,)") from None
-    point, direction = a_vector(point, f"{name}, its point"), a_vector(direction, f"{name}, its direction")
+    point, direction = three_numbers(f"{name}, its point", point), three_numbers(f"{name}, its direction", direction)
     if not direction.any():
         raise InputError(f"cross_slit: the direction of the {name} slit is zero")
     return point, direction / np.linalg.norm(direction)
-
-
-def a_vector(value: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
-        raise InputError(f"{name}={shown(value)}: give three finite numbers")
-    return found
 
 
 def ray_rows(value: Any, name: str) -> np.ndarray:

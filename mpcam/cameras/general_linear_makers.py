@@ -8,13 +8,13 @@ from mpcam.cameras.general_linear_given import (
     a_nonzero,
     a_number,
     a_slit,
-    a_vector,
     axis_pixel,
     focal_lengths,
     pixels_per_unit,
     ray_rows,
     seen_extent,
 )
+from mpcam.checks import three_numbers
 from mpcam.errors import InputError
 from mpcam.math.pose import look_at
 
@@ -53,7 +53,7 @@ class Makers:
         if not lengths.all():
             raise InputError(f"from_rays: direction {int(np.argmin(lengths))} is zero: give a direction")
         along = along / lengths[:, None]
-        axis = along.mean(axis=0) if normal is None else a_vector(normal, "normal")
+        axis = along.mean(axis=0) if normal is None else three_numbers("normal", normal)
         if not np.linalg.norm(axis) > 1e-12:
             raise InputError("from_rays: the directions cancel out, which leaves no normal: give normal=, a direction")
         axis = axis / np.linalg.norm(axis)
@@ -142,7 +142,7 @@ class Makers:
         that points up in the image. Rays start on the first slit; the second may lie before or behind it.
         """
         (p1, d1), (p2, d2) = (a_slit(line, name) for line, name in ((first, "first"), (second, "second")))
-        goal = a_vector(target, "target")
+        goal = three_numbers("target", target)
         axis = np.cross(d1, d2)
         if np.linalg.norm(axis) < 1e-9:
             raise InputError("cross_slit: the two slits are parallel, so that no plane lies along both: turn one")
@@ -155,7 +155,7 @@ class Makers:
                 f"cross_slit: along the normal of the slits, the second lies at {other:g} and the target at {depth:g} "
                 "from the first: no two of these may be equal"
             )
-        pose = _frame(goal - depth * axis, axis, a_vector(up, "up"))
+        pose = _frame(goal - depth * axis, axis, three_numbers("up", up))
         turn, shift = pose[:3, :3], pose[:3, 3]
         q1, q2, e1, e2 = ((turn @ p1 + shift)[:2], (turn @ p2 + shift)[:2], (turn @ d1)[:2], (turn @ d2)[:2])
         wide, high = seen_extent(extent, width, height)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mpcam.checks import is_number, shown, whole_number
+from mpcam.checks import is_number, shown, three_numbers, whole_number
 from mpcam.errors import InputError
 from mpcam.math import PI
 from mpcam.math.pose import look_at
@@ -134,7 +134,7 @@ class PiecewiseMakers:
         turn: angles at which the image begins and ends, radians, from the world axis x (or z, if x is upright). Raises
         InputError for sizes that are not positive, turns of more than a circle, and pieces of half a turn or more.
         """
-        middle, upright = _rows([center], "center")[0], _unit(up, "up")
+        middle, upright = three_numbers("center", center), _unit(up, "up")
         for name, value in (("radius", radius), ("extent", extent)):
             if not is_number(value) or not value > 0:
                 raise InputError(f"around({name}={shown(value)}): a number above 0 is needed")
@@ -236,7 +236,7 @@ def _rows(value: Any, name: str) -> np.ndarray:
 
 
 def _unit(value: Any, name: str) -> np.ndarray:
-    direction = _rows([value], name)[0]
+    direction = three_numbers(name, value)
     if not direction.any():
         raise InputError(f"{name} is zero: give a direction")
     return direction / np.linalg.norm(direction)

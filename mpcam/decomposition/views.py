@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
-from mpcam.checks import shown
+from mpcam.checks import three_numbers
 from mpcam.decomposition.reflector import Reflector, pixel_hits
 from mpcam.errors import InputError
 
@@ -40,13 +40,7 @@ def eye_point(eye: Any) -> np.ndarray:
                 "with one"
             )
         return np.asarray(eye.eye, np.float64)
-    try:
-        point = np.asarray(eye, np.float64)
-    except (TypeError, ValueError):
-        point = np.zeros(0)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise InputError(f"eye={shown(eye)}: give three finite numbers, or a camera")
-    return point
+    return three_numbers("eye", eye, ", or a camera")
 
 
 def view_of(reflector: Reflector, eye: Any) -> SeenPoints:

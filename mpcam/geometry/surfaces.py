@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.checks import shown, whole_number
+from mpcam.checks import shown, three_numbers, whole_number
 from mpcam.errors import InputError
 from mpcam.geometry import crossings
 from mpcam.geometry.mesh import Mesh
@@ -373,12 +373,6 @@ def _positive(name: str, value: Any) -> float:
 
 
 def _at(center: Any) -> np.ndarray:
-    try:
-        place = np.asarray(center, np.float64)
-    except (TypeError, ValueError):
-        place = np.zeros(0)
-    if place.shape != (3,) or not np.isfinite(place).all():
-        raise InputError(f"center={shown(center)}: give three finite numbers")
     pose = np.eye(4)
-    pose[:3, 3] = place
+    pose[:3, 3] = three_numbers("center", center)
     return pose
