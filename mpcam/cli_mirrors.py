@@ -28,8 +28,8 @@ def decompose(
         eye: Point x,y,z that looks into the mirror; the scene's camera if not given.
         triangles: How many at most; those of the scene's mirror, or 104.
         resolution: Pixels along the short sides of each; those of the scene's mirror, or 64.
-        mode: normals bends rays at each pixel; directions, general_linear and continuous at the vertices only. If not
-            given, that of the scene's mirror, or normals.
+        mode: How rays run between vertices: normals, directions, general_linear or continuous; that of the scene's
+            mirror if not given.
         json: Print the errors as JSON.
     """
     from dataclasses import asdict
