@@ -278,6 +278,7 @@ def test_gltf_that_is_compressed_is_refused(tmp_path):
         ("a.obj", b"v 0 0 0\nvt 0 0\nf 1/-1 1/-2 1/-1\n", "first texture coordinate"),
         ("a.obj", b"v 0 0 0\nf 1/x 1 1\n", "corner '1/x' is not of the form v, v/vt"),
         ("a.obj", b"v 0 0 0\nf 1 1 1e9\n", "corner '1e9'"),
+        ("a.obj", b"v 0 0 0\nf 1 1 99999999999999999999\n", "corner '99999999999999999999'"),
         ("a.obj", b"v 0 0\nf 1 1 1\n", "'v 0 0' has 2 numbers; it needs 3"),
         ("a.obj", b"v 0 0 zero\nf 1 1 1\n", "'zero', which is not a number"),
         ("a.ply", b"hello", "not a readable PLY"),

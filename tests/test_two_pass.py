@@ -175,3 +175,11 @@ def test_comparisons_try_it_where_cameras_are_general_linear():
     usual = METHODS["two_pass"].usual
     assert usual(GL.examples(8, 8)["pencil"]) and usual(piecewise(8)["triangles"]) and usual(piecewise(8)["grid"])
     assert not usual(mp.Pinhole(8, 8)) and not usual(mp.CameraTriangles.examples(24, 24)["direct"])
+
+
+def test_parallel_rays_see_what_lies_right_before_their_plane():
+    """Only where rays meet in it is the plane z = 0 kept away from."""
+    camera = GL.orthographic(16, 16, scale=1e4)
+    corners = np.array([[-1.0, -1.0, 1e-6], [1.0, -1.0, 1e-6], [0.0, 1.0, 1e-6], [0.0, 0.0, 5.0]])
+    mesh = mp.Mesh(corners, [[0, 1, 2], [3, 3, 3]])
+    assert mp.rasterize(camera, mesh, "two_pass", patch=5).mask.all()
