@@ -6,13 +6,14 @@ alike: `local_ray`, which is all that a camera needs, and what it knows beyond (
 
 import dataclasses
 import sys
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from mpcam.cameras.capabilities import Bounds, HasRays, Projects, need
+from mpcam.cameras.capabilities import Bends, Bounds, HasRays, Projects, need
 from mpcam.cameras.fields import Limits, limits_of
-from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
+from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry, RayPieces
 from mpcam.checks import whole_number
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, epsilon, isfinite, library, rotate, rotate_back, translation, vector, where
@@ -55,6 +56,20 @@ def _last(components: Vector) -> Array:
 
         return jnp.moveaxis(components, 0, -1)
     return np.moveaxis(components, 0, -1)
+
+
+def _stacked(entries: Sequence[Any], vectors: int) -> Iterator[Any]:
+    """Records of k solutions as one record: the first so many fields are vectors; Dr.Jit: tuples of k entries."""
+    kind = library(*entries[0])
+    for number, values in enumerate(zip(*entries, strict=True)):
+        if kind == "drjit":
+            yield values
+        elif kind == "jax":
+            import jax.numpy as jnp
+
+            yield jnp.stack([_last(v) for v in values], -2) if number < vectors else jnp.stack(values, -1)
+        else:
+            yield np.stack([_last(v) for v in values], -2) if number < vectors else np.stack(values, -1)
 
 
 def given_fields(camera: Any) -> list[str]:
@@ -109,6 +124,26 @@ class Camera:
         moved = vector(origin[0] - shift[0], origin[1] - shift[1], origin[2] - shift[2])
         return Ray(_last(rotate_back(pose, moved)), _last(rotate_back(pose, direction)), valid)
 
+    def ray_pieces(self, pixel: Array) -> RayPieces:
+        """The straight pieces of the bent rays of pixels, in the world frame.
+
+        pixel (..., 2). Returns RayPieces with origin, direction (..., k, 3) and start, end, valid (..., k). Dr.Jit: an
+        Array2f in, tuples of k entries out. Raises InputError for a camera whose rays are straight, and when the last
+        axis is not 2.
+        """
+        register_pytrees()
+        local = need(self, Bends, "ray_pieces()", "its rays are straight, ray() gives them").local_ray_pieces
+        with _quiet():
+            pieces = local(components(pixel, 2, "pixel"))
+        pose, shift = self.camera_from_world, translation(self.camera_from_world)
+
+        def placed(piece: RayPieces) -> RayPieces:
+            moved = vector(*(piece.origin[i] - shift[i] for i in range(3)))
+            turned = rotate_back(pose, moved), rotate_back(pose, piece.direction)
+            return piece._replace(origin=turned[0], direction=turned[1])
+
+        return RayPieces(*_stacked([placed(piece) for piece in pieces], 2))
+
     def project(self, points: Array) -> Projection:
         """All images of points.
 
@@ -119,18 +154,7 @@ class Camera:
         local_project = need(self, Projects, "project()").local_project
         with _quiet():
             images = local_project(self.local(components(points, 3, "points")))
-        kind = library(*images[0])
-        if kind == "drjit":
-            return Projection(*(tuple(image[i] for image in images) for i in range(3)))
-        if kind == "jax":
-            import jax.numpy as functions
-        else:
-            functions = np
-        return Projection(
-            functions.stack([_last(image.pixel) for image in images], -2),
-            functions.stack([image.depth for image in images], -1),
-            functions.stack([image.valid for image in images], -1),
-        )
+        return Projection(*_stacked(images, 1))
 
     def bound(self, triangle: Array) -> Box:
         """A box of pixels that holds the whole image of each triangle (conservative; as tight as the model allows).

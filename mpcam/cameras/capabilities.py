@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar, runtime_checkable
 import numpy as np
 
 from mpcam.cameras.outline import Outline, VertexView
-from mpcam.cameras.types import Box, Projection, Ray
+from mpcam.cameras.types import Box, Projection, Ray, RayPieces
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector
 
@@ -19,6 +19,18 @@ class HasRays(Protocol):
     """Every camera: the ray of each pixel."""
 
     def local_ray(self, pixel: Vector) -> Ray: ...
+
+
+@runtime_checkable
+class Bends(Protocol):
+    """Rays that are bent: straight piece by piece, at most `pieces_per_ray` of them, in order along the ray.
+
+    Depths of such a camera are lengths along the bent ray.
+    """
+
+    pieces_per_ray: int
+
+    def local_ray_pieces(self, pixel: Vector) -> tuple[RayPieces, ...]: ...
 
 
 @runtime_checkable
@@ -60,6 +72,7 @@ class Outlines(Bounds, Images, Protocol):
 
 _WORDS: dict[type, str] = {
     HasRays: "rays of pixels (local_ray)",
+    Bends: "bent rays (local_ray_pieces)",
     Projects: "images of points (local_project)",
     Images: "one image for each point (local_image)",
     Bounds: "boxes around images of triangles (local_bound)",

@@ -21,6 +21,22 @@ class Ray(NamedTuple):
     valid: Array
 
 
+class RayPieces(NamedTuple):
+    """The straight pieces of bent rays, in the order in which they are run through; k is the most that a ray can have.
+
+    origin (..., k, 3): where each piece starts. direction (..., k, 3): unit length. start, end (..., k): lengths along
+    the bent ray, scene units, so that the point at length s of a piece is origin + (s - start) direction; end is
+    infinite where a ray goes on for ever. valid (..., k): False where there is no such piece; the rest is finite there,
+    and means nothing. A piece starts where the one before it ends.
+    """
+
+    origin: Array
+    direction: Array
+    start: Array
+    end: Array
+    valid: Array
+
+
 class PosedRays(NamedTuple):
     """Rays of pixels in a frame that is not the world's: what hits were found with.
 
