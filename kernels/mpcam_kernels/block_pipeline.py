@@ -135,7 +135,7 @@ class BlockPipeline:
             for start in range(0, number, ROOM):
                 thread = threads(types, start, min(number, start + ROOM))
                 empty = blocks.room(types, dr.width(thread), self.blocks)
-                small, lists = self._cover(thread, rays.slopes, setups, pairs, walking, ROOM, empty)
+                small, lists = self._cover(thread, rays, setups, pairs, walking, ROOM, empty)
                 few = dr.compress(small) if walking else types.UInt()
                 if dr.width(few):
                     canvas.state = self._walk(few, thread, rays.rays, rays.slopes, setups, pairs, canvas.state)
@@ -200,9 +200,9 @@ class BlockPipeline:
         return targets
 
     def _cover_pass(
-        self, thread: Any, slopes: Any, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
+        self, thread: Any, rays: RayBlocks, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
     ) -> tuple[Any, Lists]:
-        return cover.covered(self.types, self.test, thread, slopes, setups, pairs, walking, room, lists)
+        return cover.covered(self.types, self.test, thread, rays, setups, pairs, walking, room, lists)
 
     def _walk_pass(
         self, chosen: Any, thread: Any, rays: Any, slopes: Any, setups: Rows, pairs: Any, state: State

@@ -19,16 +19,16 @@ WIDE, HIGH = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
 
 
 def covered(
-    types: Any, test: Any, thread: Any, slopes: Any, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
+    types: Any, test: Any, thread: Any, rays: Any, setups: Rows, pairs: Any, walking: bool, room: int, lists: Lists
 ) -> tuple[Any, Lists]:
     """Lists of the triangles of pairs by block, and with `walking` which pairs are small enough for a thread to walk.
 
-    room: pairs at a time, of which `thread` has some.
+    rays: `RayBlocks`. room: pairs at a time, of which `thread` has some.
     """
     block, triangle = pairs.at(thread)
     shape = test.unpack(setups.at(types, triangle))
-    edges, front, back = slopes.edges(types, shape, block)
-    bits, small = _parts(types, edges, front, back), types.Bool(False)
+    edges, front, back = rays.slopes.edges(types, shape, block)
+    bits, small = _parts(types, edges, front, back) & dr.gather(types.UInt, rays.parts, block), types.Bool(False)
     some = bits != 0
     if walking:
         _, _, slots = _box(types, _lines(types, edges, front))

@@ -64,10 +64,10 @@ def hit(triangle: PluckerTriangle, ray: Ray) -> tuple[Any, Float]:
     Rays hit where both hold: between the edges, and an inverse distance above zero.
     """
     a, b, c = _sides(triangle, ray)
-    lowest, highest = dr.minimum(dr.minimum(a, b), c), dr.maximum(dr.maximum(a, b), c)
+    between = ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
     away = triangle.offset - dr.dot(ray.origin, triangle.normal)
     # A ray that starts in the triangle's plane is at no distance from it: no hit, as for a tracer.
-    return ((lowest >= 0) | (highest <= 0)) & (away != 0), dr.dot(ray.direction, triangle.normal) / away
+    return between & (away != 0), dr.dot(ray.direction, triangle.normal) / away
 
 
 def inside(triangle: PluckerTriangle, ray: Ray) -> Any:

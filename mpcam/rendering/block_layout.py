@@ -10,7 +10,7 @@ from mpcam.backend import types
 from mpcam.cameras.atlas import Atlas
 from mpcam.geometry.order import interleaved
 from mpcam_kernels.ray_blocks import GROUP, SIDE, place_in_group
-from mpcam_kernels.samples import HEIGHT, PIXELS, WIDTH, in_block
+from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,13 @@ class BlockLayout:
     def groups(self) -> int:
         return int(self.group[-1]) + 1
 
+    @property
+    def parts(self) -> np.ndarray:
+        """(B,) uint32, the parts of each block that hold pixels, as bits."""
+        part, there = PIXELS // PARTS, np.zeros(self.blocks * PARTS, bool)
+        there[self.slots[self.slots >= 0] // part] = True
+        return (there.reshape(-1, PARTS) << np.arange(PARTS)).sum(axis=1).astype(np.uint32)
+
     @functools.cached_property
     def on_device(self) -> dict[str, Any]:
         """What of the layout kernels need: see `mpcam_kernels.ray_blocks.RayBlocks`; slots; and thread indices."""
@@ -56,6 +63,7 @@ class BlockLayout:
             "count": count,
             "numbers": numbers.ravel(),
             "exist": exist,
+            "parts": self.parts,
         }
         found: dict[str, Any] = {
             name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()

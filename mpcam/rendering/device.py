@@ -13,7 +13,8 @@ from mpcam.geometry.order import nearby
 
 FAR = 64.0
 """Scales from the anchor, and times the nearest vertex, from which a camera is far away."""
-_SAMPLE = 4096  # vertices that tell where most of a mesh is
+_SAMPLE = 1024  # vertices that tell where most of a mesh is
+_TOGETHER = 64  # rows of three numbers that NumPy takes as one: loops over three numbers alone are slow
 _FAR = 64.0  # a mesh that reaches so many times farther than most of its vertices has something far away
 
 
@@ -46,7 +47,7 @@ class DeviceMesh:
 
     def used_of(self, mesh: Mesh) -> np.ndarray:
         """Those of the mesh's vertices that faces use."""
-        return mesh.vertices if self.used is None else mesh.vertices[self.used]
+        return mesh.vertices if self.used is None else mesh.vertices.take(self.used, axis=0)
 
     def stands_apart(self, mesh: Mesh, point: np.ndarray) -> float | None:
         """How far a point (3,) is from the nearest vertex, if it is far from most of them but right before some."""
@@ -93,10 +94,28 @@ class DeviceMesh:
 def in_frame(vertices: np.ndarray, anchor: np.ndarray, scale: float) -> Any:
     """Positions (V, 3) around an anchor (3,) in units of a scale, uploaded: a flat Float."""
     with np.errstate(invalid="ignore", over="ignore"):
-        flat = ((vertices - anchor) / scale).astype(np.float32).ravel()
+        flat = _around(vertices, anchor, scale)
     if flat.size == 0:
         return types().Float()
     return types().Float(flat) + opaque_zero()  # in Dr.Jit's own memory: frozen kernels are particular about alignment
+
+
+def _around(vertices: np.ndarray, anchor: np.ndarray, scale: float) -> np.ndarray:
+    """(vertices - anchor) / scale in float32, flat."""
+    together, rest = _rows_together(vertices)
+    result = np.empty(vertices.size, np.float32)
+    cut = together.size
+    moved = together - np.tile(anchor, _TOGETHER)
+    moved /= scale
+    result[:cut] = moved.ravel()
+    result[cut:] = ((rest - anchor) / scale).ravel()
+    return result
+
+
+def _rows_together(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (V, 3) as rows of `_TOGETHER` of them, and the few that are left over."""
+    cut = len(vertices) - len(vertices) % _TOGETHER
+    return vertices[:cut].reshape(-1, 3 * _TOGETHER), vertices[cut:]
 
 
 def _used(mesh: Mesh) -> np.ndarray | None:
@@ -111,17 +130,16 @@ def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float, bool]:
 
     The scale is a power of two, the anchor a multiple of an eighth of it.
     """
-    ends = np.array([_ends(vertices[:, i]) for i in range(3)])
-    low, high = ends[:, 0], ends[:, 1]
-    if not np.isfinite(ends).all():
+    low, high = _ends(vertices)
+    if not np.isfinite([low, high]).all():
         vertices = vertices[np.isfinite(vertices).all(axis=1)]
         if len(vertices) == 0:
             return np.zeros(3), 1.0, False
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        low, high = _ends(vertices)
     center, extent = 0.5 * low + 0.5 * high, float((0.5 * high - 0.5 * low).max())
     sample = vertices[:: max(len(vertices) // _SAMPLE, 1)]
-    middle = np.median(sample, axis=0)
-    usual = 4.0 * float(np.median(np.abs(sample - middle).max(axis=1)))
+    middle = _median(sample)
+    usual = 4.0 * float(_median(np.abs(sample - middle).max(axis=1, keepdims=True))[0])
     far = 0 < usual and extent > _FAR * usual
     if far:
         center, extent = middle, usual
@@ -134,8 +152,21 @@ def _frame(vertices: np.ndarray) -> tuple[np.ndarray, float, bool]:
     return np.where(np.isfinite(snapped), snapped, center), scale, far
 
 
-def _ends(values: np.ndarray) -> tuple[float, float]:
-    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+def _ends(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates of positions (V, 3), NaN where one is NaN or there are none."""
+    if len(vertices) == 0:
+        return np.full(3, np.nan), np.full(3, np.nan)
+    found = []
+    for function in (np.min, np.max):
+        parts = [function(part, axis=0).reshape(-1, 3) for part in _rows_together(vertices) if len(part)]
+        found.append(function(np.concatenate(parts), axis=0))
+    return found[0], found[1]
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """Of each column of (N, C), the upper one of an even number."""
+    half = len(values) // 2
+    return np.partition(np.ascontiguousarray(values.T), half, axis=1)[:, half]
 
 
 _meshes: weakref.WeakKeyDictionary[Mesh, DeviceMesh] = weakref.WeakKeyDictionary()

@@ -81,6 +81,7 @@ def bounded(kind: str, rays: Any, layout: BlockLayout, planes: Any = None) -> An
         count,
         fixed["numbers"],
         fixed["exist"],
+        fixed["parts"],
         corners,
         planes,
     )
