@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mpcam as mp
-from mpcam.cameras.nearly_linear import near_image
+from mpcam.cameras.nearly_linear import near_image, nearest_image
 from mpcam.decomposition.decompose import decompose, directions_at_vertices, in_own_planes
 from mpcam.decomposition.shared_lengths import shared_lengths, slants, spread, with_shared_lengths
 
@@ -100,6 +100,75 @@ def test_two_steps_from_the_closed_form_end_at_the_image(direct, name, share):
     assert (more.residual < 1e-12).mean() > share - 0.02
     start = near_image(places, rays, point, steps=0)
     assert np.median(start.residual) > 10 * np.median(found.residual)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return {name: decompose(shape, EYE, 416, mode="continuous") for name, shape in SHAPES.items()}
+
+
+@pytest.mark.parametrize(("name", "rays", "limit"), [("sphere", 0.95, 0.045), ("wave", 0.78, 0.032)])
+def test_fitted_rays_are_nearly_general_linear_without_paying_in_rays(direct, fitted, name, rays, limit):
+    unit, cams = direct[name], fitted[name]
+    assert (cams.faces == unit.faces).all() and (cams.vertices == unit.vertices).all()
+    errors = [mp.ray_error(one, SHAPES[name], EYE) for one in (unit, with_shared_lengths(unit), cams)]
+    assert errors[2].rms < rays * errors[0].rms < 0.7 * errors[1].rms
+    assert errors[2].missed == 0
+    kept = regular(unit)
+    assert np.median(spread(cams)[kept]) < limit < 0.2 * np.median(spread(unit)[kept])
+    origin, along = edge_rays(cams)
+    assert np.abs(along[:, 0] - along[:, 1]).max() < 1e-12 and np.abs(origin[:, 0] - origin[:, 1]).max() < 1e-12
+
+
+def test_the_steps_of_the_fit_are_those_of_its_sum(direct):
+    """The normal equations' right side is half the gradient of the sum of squares, by differences."""
+    from mpcam.decomposition.continuous import _Fit, _samples
+    from mpcam.decomposition.reflector import reflector_of
+    from mpcam.decomposition.views import seen_samples
+
+    shape = SHAPES["wave"]
+    cams = decompose(shape, EYE, 60)
+    unit, whole = directions_at_vertices(cams), reflector_of(shape)
+    samples = _samples(cams, unit.directions, seen_samples(whole, EYE, 2000), whole.radius)
+    start = with_shared_lengths(unit)
+    fit = _Fit(start, regular(unit), samples)
+    rng = np.random.default_rng(0)
+    rays = start.directions * rng.uniform(0.95, 1.05, (len(start.directions), 1))
+    _, right = fit.equations(rays, 3.0)
+    for _ in range(3):
+        way = rng.normal(size=rays.shape)
+        slope = (fit.cost(rays + 1e-6 * way, 3.0) - fit.cost(rays - 1e-6 * way, 3.0)) / 2e-6
+        # Means are held while a triangle's parts are weighed, which is off by the square of the spread.
+        assert 2 * right @ way.ravel() == pytest.approx(slope, rel=0.05, abs=0.01 * np.linalg.norm(right))
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_every_point_has_its_image_by_the_steps_or_by_the_cubic(fitted, name):
+    cams = fitted[name]
+    rng = np.random.default_rng(1)
+    face, weights, distance = (
+        rng.integers(cams.count, size=3000),
+        rng.dirichlet([1, 1, 1], 3000),
+        rng.uniform(0.1, 9, 3000),
+    )
+    places, rays = (tuple(cams.corners(i)[k][:, face] for i in range(3)) for k in range(2))
+    point = sum(w * (p + distance * r) for w, p, r in zip(weights.T, places, rays, strict=True))
+    two, every = near_image(places, rays, point), nearest_image(places, rays, point)
+    assert 0.5 < (two.residual < 1e-6).mean() < 0.99
+    assert every.residual.max() < 1e-6
+    assert np.minimum(np.minimum(every.second, every.third), 1 - every.second - every.third).min() > -1e-3
+    found = [1 - every.second - every.third, every.second, every.third]
+    met = sum(w * (p + every.c * r) for w, p, r in zip(found, places, rays, strict=True))
+    assert np.linalg.norm(met - point, axis=0).max() < 1e-4
+    same = np.abs(every.second - weights[:, 1]) + np.abs(every.third - weights[:, 2]) < 1e-5
+    assert same.mean() > 0.9  # of several images it may be another
+
+
+def test_flat_mirrors_keep_their_rays():
+    mirror = mp.Surface.paraboloid(1.0, 0.0)
+    cams = decompose(mirror, EYE, 30, mode="continuous")
+    assert np.isfinite(cams.directions).all() and cams.ray_scale == "near_far"
+    assert mp.ray_error(cams, mirror, EYE).missed == 0
 
 
 def test_in_their_own_planes_the_closed_form_is_exact(direct):

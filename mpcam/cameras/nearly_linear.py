@@ -7,9 +7,16 @@ on both weights and the distance together end there, without a cubic.
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from mpcam.cameras import three_rays
 from mpcam.cameras.hulls import minus
 from mpcam.cameras.plane_sweep import plane_sweep
 from mpcam.math import Array, Vector, absolute, cross, dot, epsilon, isfinite, norm, vector, where
+
+LIMIT = 1e-6
+"""Largest residual that counts as an image."""
+_EDGE = 1e-9
 
 
 class NearImage(NamedTuple):
@@ -52,6 +59,34 @@ def near_image(places: Any, rays: Any, point: Vector, steps: int = 2) -> NearIma
     residual = norm(gap) / size
     sound = usable & isfinite(residual)
     return NearImage(second, third, distance, where(sound, residual, float("inf")))
+
+
+def nearest_image(places: Any, rays: Any, point: np.ndarray, steps: int = 2) -> NearImage:
+    """The same, of points (3, N) that lie in these camera triangles, for NumPy: exact where the steps are not.
+
+    Where they do not end on an image in the triangle, `three_rays.project` finds all, and the one nearest to where the
+    steps led is taken; without one, the residual stays what it was. places, rays: three arrays (3, N) each.
+    """
+    with np.errstate(all="ignore"):
+        found = near_image(places, rays, point, steps)
+        least = np.minimum(np.minimum(found.second, found.third), 1.0 - found.second - found.third)
+        left = np.flatnonzero(~((found.residual <= LIMIT) & (least >= -_EDGE) & (found.c >= 0)))
+        if not len(left):
+            return found
+        second, third, c, residual = (np.array(part) for part in found)
+        corners, ways = ([part[:, left] for part in parts] for parts in (places, rays))
+        images = three_rays.project(corners, ways, point[:, left])
+        away = np.stack([np.abs(i.w2 - second[left]) + np.abs(1.0 - i.w1 - i.w2 - third[left]) for i in images])
+        away = np.where(np.stack([i.valid for i in images]), np.where(np.isfinite(away), away, 1e300), np.inf)
+        best, column = away.argmin(axis=0), np.arange(len(left))
+        some = np.isfinite(away[best, column])
+        first, other, distance = (np.stack([i[k] for i in images])[best, column] for k in range(3))
+        w2, w3 = other, 1.0 - first - other
+        sides, turns = ([minus(part[k], part[0]) for k in (1, 2)] for part in (corners, ways))
+        _, gap, size = _miss(corners[0], ways[0], sides, turns, point[:, left], w2, w3, distance)
+        for table, values in ((second, w2), (third, w3), (c, distance), (residual, norm(gap) / size)):
+            table[left[some]] = values[some]
+    return NearImage(second, third, c, residual)
 
 
 def _miss(

@@ -9,8 +9,9 @@ import numpy as np
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import whole_number
 from mpcam.decomposition.coarse import Coarse, Coarsening
+from mpcam.decomposition.continuous import continuous
 from mpcam.decomposition.reflector import Reflector, reflector_of
-from mpcam.decomposition.shared_lengths import slants, with_shared_lengths
+from mpcam.decomposition.shared_lengths import slants
 from mpcam.decomposition.shooting import Locator, shoot
 from mpcam.decomposition.views import SLACK, SeenPoints, on_mesh, view_of
 from mpcam.errors import InputError
@@ -55,8 +56,9 @@ def decompose(
     atlas. index: refractive index behind the surface over that on the eye's side, None for a mirror. mode: "normals"
     bends the rays pixel by pixel; the others only at the vertices. "directions": unit directions in between (Hou et al.
     2006); "general_linear": each triangle a general linear camera in its own plane (Yu et al. 2009, section 5.2), with
-    one image of a point but seams between neighbors; "continuous": lengths shared by all triangles around a vertex, so
-    that each is as nearly general linear as it can be, without a seam (see `shared_lengths`).
+    one image of a point but seams between neighbors; "continuous": rays and lengths at the vertices fitted so that each
+    triangle is nearly general linear and rays are no worse than those of "directions", without a seam (see
+    `decomposition.continuous`).
 
     Vertices lie on the true surface and have its normals. Both sides of the surface count. Returns CameraTriangles in
     the world frame. Raises InputError for an eye that sees nothing of the reflector or lies on it, and for other
@@ -76,7 +78,7 @@ def decompose(
     direct = directions_at_vertices(cams)
     if mode == "general_linear":
         return in_own_planes(direct)
-    return direct if mode == "directions" else with_shared_lengths(direct)
+    return direct if mode == "directions" else continuous(cams, direct, whole, eye)
 
 
 def directions_at_vertices(cams: CameraTriangles) -> CameraTriangles:

@@ -8,9 +8,10 @@ import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import is_number, shown, whole_number
+from mpcam.decomposition.crossing import crossing
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shooting import Locator
-from mpcam.decomposition.views import seen_samples
+from mpcam.decomposition.views import SeenPoints, seen_samples
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
@@ -64,17 +65,19 @@ def ray_error(
     cams = in_world(cams)
     view = seen_samples(whole, eye, samples)
     check_eye(cams, view.eye, whole.radius)
+    return error_beside(cams, whole, view, float(far))
+
+
+def error_beside(cams: CameraTriangles, whole: Reflector, view: SeenPoints, far: float) -> RayError:
+    """`ray_error` of camera triangles in the world beside given points, in a plane `far` scene units away."""
     index = cams.index
     true, passes = bent(view.points - view.eye, view.normals, index)
     place = Locator(cams.vertices, vertex_normals(cams, whole), cams.faces).locate(view.points, view.normals)
     origin, along, valid = cams.ray_at(place.face, place.second, place.third)
     with np.errstate(all="ignore"):
-        along = (along / np.linalg.norm(along, axis=0)).T
-        goal = view.points + far * true
-        forward = (along * true).sum(axis=1)
-        reach = ((goal - origin.T) * true).sum(axis=1) / forward
-        miss = np.linalg.norm(origin.T + reach[:, None] * along - goal, axis=1)
-        angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(along - true, axis=1), 1.0))
+        met = crossing(origin, along, view.points.T, true.T, far)
+        miss, forward, reach = np.linalg.norm(met.miss, axis=0), met.forward, met.reach
+        angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(met.along.T - true, axis=1), 1.0))
     good = valid & (forward > 0) & (reach > 0)
     compared, missed = good & passes, int((passes & ~good).sum())
     if not compared.any():
@@ -91,7 +94,7 @@ def ray_error(
         angle_rms=float(1e3 * np.sqrt((angle**2).mean())),
         count=int(compared.sum()),
         missed=missed,
-        distance=float(far),
+        distance=far,
     )
 
 

@@ -10,9 +10,10 @@ from mpcam.comparison import timing
 from mpcam.comparison.metrics import flip_map, image_rmse, psnr
 from mpcam.comparison.motion import moving_frame, moving_vertices
 from mpcam.comparison.progress import Progress, StepCounter
+from mpcam.decomposition.continuous import continuous
 from mpcam.decomposition.decompose import MODES, decompose, directions_at_vertices, in_own_planes
 from mpcam.decomposition.ray_error import ray_error
-from mpcam.decomposition.shared_lengths import with_shared_lengths
+from mpcam.decomposition.reflector import reflector_of
 from mpcam.effects.reflection import Reflection
 from mpcam.effects.shadows import shadow_maps
 from mpcam.experiments import yu2009_paper_mirrors as paper
@@ -127,7 +128,7 @@ def cameras(scene: Scene, number: int, side: int) -> dict[str, CameraTriangles]:
     return {
         "general_linear": linear,
         "directions": direct,
-        "continuous": with_shared_lengths(direct),
+        "continuous": continuous(bent, direct, reflector_of(scene.mirror.surface), scene.camera),
         "normals": bent,
     }
 
