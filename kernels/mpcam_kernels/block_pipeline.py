@@ -13,7 +13,7 @@ from typing import Any
 
 import drjit as dr
 
-from mpcam_kernels import blocks, central_rays, cover, general_rays, hierarchy, pixels
+from mpcam_kernels import blocks, central_rays, cover, general_rays, hierarchy, pixels, ray_pieces
 from mpcam_kernels.blocks import Large, Lists
 from mpcam_kernels.candidates import CULLING, Candidates, Tell
 from mpcam_kernels.frozen import frozen
@@ -29,7 +29,7 @@ ROOM = 1 << 20  # pairs of a block and a triangle at a time
 SPLIT = 1 << 19  # pairs of a group and a triangle at a time; each becomes at most GROUP pairs, 8 bytes each
 PIXELS_PER_TRIANGLE = 16  # where there are fewer, and lists would be long, a thread each finishes small triangles
 LONG_LIST = 16  # triangles of a block, on average
-RAYS = {"central": central_rays, "general": general_rays}
+RAYS = {"central": central_rays, "general": general_rays, "bent": ray_pieces}
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,9 @@ class Canvas:
 class BlockPipeline:
     """The kernels of one output for so many blocks; frozen.
 
-    rays: "central" or "general", what the blocks hold. output: "hits", "depth" or "coverage". cull: "none", or "back"
-    or "front", the side of triangles that is not shown. count: also count tests and hits. culling: see `Candidates`.
+    rays: "central", "general" or "bent", what the blocks hold. output: "hits", "depth" or "coverage". cull: "none", or
+    "back" or "front", the side of triangles that is not shown. count: also count tests and hits. culling: see
+    `Candidates`.
     """
 
     def __init__(

@@ -13,16 +13,17 @@ def triangles(types: Any, output: Any, keys: Any) -> Any:
     return dr.select(keys == 0, -1, types.Int(output.triangle(types, keys)))
 
 
-def depths(types: Any, output: Any, keys: Any, scale: Any) -> Any:
-    """Float depth of every pixel times `scale`, infinite where nothing is."""
-    return dr.select(keys == 0, dr.inf, scale / output.nearness(types, keys))
+def depths(types: Any, output: Any, keys: Any, scale: Any, start: Any = None) -> Any:
+    """Float depth of every pixel times `scale`, infinite where nothing is. start: depths that distances count from."""
+    near = output.nearness(types, keys)
+    return dr.select(keys == 0, dr.inf, scale / near if start is None else (start + 1.0 / near) * scale)
 
 
-def frame(types: Any, output: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
+def frame(types: Any, output: Any, keys: Any, unit: Any, start: Any = None) -> tuple[Any, ...]:
     """What a frame of an output (see `outputs`) holds: triangle and depth, depth, or whether there is anything."""
     if not output.depth:
         return (keys != 0,)
-    depth = depths(types, output, keys, unit)
+    depth = depths(types, output, keys, unit, start)
     return (triangles(types, output, keys), depth) if hasattr(output, "triangle") else (depth,)
 
 

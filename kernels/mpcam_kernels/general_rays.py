@@ -93,12 +93,12 @@ class Slopes:
         return edges, away + reach >= 0, away - reach <= 0
 
 
-def block_bounds(types: Any, rays: Rays, block: Any) -> tuple[list[Any], list[Any]]:
+def block_bounds(types: Any, rays: Any, block: Any) -> tuple[list[Any], list[Any]]:
     """Rows of the cones and of the slopes of blocks by number, from the rays of their pixels."""
     zero, slot = types.UInt(0), block * PIXELS
 
     def sample(k: Any) -> tuple[list[Any], Any, Any, Any]:
-        d, m, o = rays.at(types, slot + k)
+        d, m, o = rays.at(types, slot + k)[:3]
         return [d, m, o], *position(types, k), dr.squared_norm(d) > 0
 
     def below(k: Any, *_: Any) -> Any:

@@ -50,7 +50,7 @@ def setup(a: Vector, b: Vector, c: Vector) -> PluckerTriangle:
     )
 
 
-def _sides(triangle: PluckerTriangle, ray: Ray) -> list[Float]:
+def _sides(triangle: PluckerTriangle, ray: Any) -> list[Float]:
     d, m = ray.direction, ray.moment
     return [
         dr.fma(d.x, n.x, dr.fma(d.y, n.y, dr.fma(d.z, n.z, dr.fma(m.x, e.x, dr.fma(m.y, e.y, m.z * e.z)))))
@@ -58,16 +58,21 @@ def _sides(triangle: PluckerTriangle, ray: Ray) -> list[Float]:
     ]
 
 
+def between(triangle: PluckerTriangle, ray: Any) -> Any:
+    """Whether lines run between the three edges."""
+    a, b, c = _sides(triangle, ray)
+    return ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
+
+
 def hit(triangle: PluckerTriangle, ray: Ray) -> tuple[Any, Float]:
     """Whether lines run between the three edges, and the inverse of the distance along the ray.
 
     Rays hit where both hold: between the edges, and an inverse distance above zero.
     """
-    a, b, c = _sides(triangle, ray)
-    between = ((a >= 0) & (b >= 0) & (c >= 0)) | ((a <= 0) & (b <= 0) & (c <= 0))
+    covered = between(triangle, ray)
     away = triangle.offset - dr.dot(ray.origin, triangle.normal)
     # A ray that starts in the triangle's plane is at no distance from it: no hit, as for a tracer.
-    return between & (away != 0), dr.dot(ray.direction, triangle.normal) / away
+    return covered & (away != 0), dr.dot(ray.direction, triangle.normal) / away
 
 
 def inside(triangle: PluckerTriangle, ray: Ray) -> Any:
@@ -76,7 +81,7 @@ def inside(triangle: PluckerTriangle, ray: Ray) -> Any:
     return covered & (nearness > 0)
 
 
-def weights(triangle: PluckerTriangle, ray: Ray) -> tuple[Float, Float]:
+def weights(triangle: PluckerTriangle, ray: Any) -> tuple[Float, Float]:
     """Barycentric weights of corners b and c at the point that a ray hits."""
     e0, e1, e2 = _sides(triangle, ray)
     scale = 1.0 / (e0 + e1 + e2)
@@ -113,16 +118,17 @@ class OneSided:
     ROWS = ROWS
     setup, pack = staticmethod(setup), staticmethod(pack)
     unpack, weights = staticmethod(unpack), staticmethod(weights)
+    whole = staticmethod(hit)  # of both sides
 
     def __init__(self, cull: str):
         self.sign = {"back": -1.0, "front": 1.0}[cull]
 
-    def hit(self, triangle: PluckerTriangle, ray: Ray) -> tuple[Any, Float]:
+    def hit(self, triangle: PluckerTriangle, ray: Any) -> tuple[Any, Float]:
         """As `hit`, where the side is shown."""
-        covered, nearness = hit(triangle, ray)
+        covered, nearness = self.whole(triangle, ray)
         return covered & (self.sign * dr.dot(ray.direction, triangle.normal) > 0), nearness
 
-    def inside(self, triangle: PluckerTriangle, ray: Ray) -> Any:
+    def inside(self, triangle: PluckerTriangle, ray: Any) -> Any:
         """As `inside`, where the side is shown."""
         covered, nearness = self.hit(triangle, ray)
         return covered & (nearness > 0)

@@ -27,7 +27,7 @@ class RayBlocks:
     row). exist: which of these places have a block, as bits. parts: which parts of each block hold pixels, as bits.
     corners: first column and row of each block. planes: what bounds images there (see `planes.Planes`), or None.
 
-    Rays, cones and slopes are those of `general_rays` or of `central_rays`.
+    Rays, cones and slopes are those of `general_rays`, of `central_rays` or of `ray_pieces`.
     """
 
     rays: Any

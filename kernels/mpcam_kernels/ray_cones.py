@@ -72,9 +72,13 @@ class Cones:
         """How many there are."""
         return dr.width(self.rows.flat) // (4 * self.rows.count)
 
-    def __call__(self, types: Any, number: Any, active: Any = True) -> Cone:
+    def __call__(self, types: Any, number: Any, active: Any = True) -> Any:
         """Cones by number."""
-        first, second = self.rows.at(types, number, active)
+        return self.cone(types, number, active)
+
+    def cone(self, types: Any, number: Any, active: Any = True) -> Cone:
+        """Cones by number, without what others may know of their ends."""
+        first, second, *_ = self.rows.at(types, number, active)
         bits: Any = dr.reinterpret_array(types.UInt, second.w)
         spread, waist = (dr.reinterpret_array(types.Float, half) for half in (bits & 0xFFFF0000, bits << 16))
         return Cone(first.xyz, first.w, second.xyz, spread, waist)
@@ -88,7 +92,7 @@ class Cones:
 
         def one(k: Any) -> tuple[Cone, Any, Any]:
             """A cone, where its rays start on the whole, and 1 if there is any."""
-            cone = self(types, first + k)
+            cone = self.cone(types, first + k)
             return cone, cone.center - cone.waist * cone.axis, dr.select(cone.reach >= 0, types.Float(1), 0)
 
         def add(k: Any, n: Any, start: Any, axis: Any) -> Any:

@@ -15,11 +15,12 @@ from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
 @dataclass(frozen=True, eq=False)
 class BlockLayout:
-    """Blocks of an image, or of the camera triangles of an atlas one after the other, group by group.
+    """Blocks of an image, of layers of it, or of the camera triangles of an atlas one after the other, group by group.
 
-    face (B,): camera triangle of each block, 0 in an image. x, y (B,): first column and row of each block, in the image
-    or from corner 1 of its camera triangle. group (B,): the group of each block; no group has blocks of two camera
-    triangles. slots (H * W,): slot of each pixel, -1 for none.
+    face (B,): camera triangle or layer of each block, 0 in an image. x, y (B,): first column and row of each block, in
+    the image or from corner 1 of its camera triangle. group (B,): the group of each block; no group has blocks of two
+    camera triangles, or layers. slots (layers * H * W,): slot of each pixel, layer by layer, -1 for none. pixels: of
+    the image, H * W.
     """
 
     face: np.ndarray
@@ -27,6 +28,7 @@ class BlockLayout:
     y: np.ndarray
     group: np.ndarray
     slots: np.ndarray
+    pixels: int
 
     @property
     def blocks(self) -> int:
@@ -45,7 +47,10 @@ class BlockLayout:
 
     @functools.cached_property
     def on_device(self) -> dict[str, Any]:
-        """What of the layout kernels need: see `mpcam_kernels.ray_blocks.RayBlocks`; slots; and thread indices."""
+        """What of the layout kernels need: see `mpcam_kernels.ray_blocks.RayBlocks`; slots; and thread indices.
+
+        layers: how many layers and how many pixels there are.
+        """
         import drjit as dr
 
         t = types()
@@ -69,6 +74,8 @@ class BlockLayout:
             name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()
         }
         found["slots"] = t.Int(self.slots)
+        found["layers"] = t.UInt([len(self.slots) // self.pixels]), t.UInt([self.pixels])
+        found["pixels"] = dr.arange(t.UInt, self.pixels)
         found["threads"] = [dr.arange(t.UInt, n) for n in (self.blocks * PIXELS, self.blocks, self.groups)]
         dr.make_opaque(found)
         return found
@@ -82,7 +89,40 @@ def image_layout(width: int, height: int) -> BlockLayout:
     grid[y // HEIGHT, x // WIDTH] = np.arange(len(x))
     column, row = np.arange(width), np.arange(height)[:, None]
     slots = grid[row // HEIGHT, column // WIDTH] * PIXELS + in_block(column % WIDTH, row % HEIGHT)
-    return BlockLayout(np.zeros(len(x), np.int32), x, y, group, slots.astype(np.int32).ravel())
+    return BlockLayout(np.zeros(len(x), np.int32), x, y, group, slots.astype(np.int32).ravel(), width * height)
+
+
+def layered_layout(width: int, height: int, layers: list[tuple[np.ndarray, np.ndarray]]) -> BlockLayout:
+    """The blocks of an image layer by layer, only those that hold pixels; one empty block if no layer has any.
+
+    layers: the pixels of each layer, row by row, and a number for each of them: pixels with different numbers are in
+    blocks and groups of their own.
+    """
+    image = image_layout(width, height)
+    faces, places, groups, slots, blocks, before = [], [], [], [], 0, 0
+    for number, (pixels, parts) in enumerate(layers):
+        at = image.slots[pixels]
+        keys, place = np.unique(parts * image.blocks + at // PIXELS, return_inverse=True)
+        part, block = np.divmod(keys, image.blocks)
+        group = np.unique(part * image.groups + image.group[block], return_inverse=True)[1]
+        slots.append(np.full(width * height, -1, np.int32))
+        slots[-1][pixels] = (blocks + place) * PIXELS + at % PIXELS
+        faces.append(np.full(len(keys), number))
+        places.append(block)
+        groups.append(before + group)
+        blocks, before = blocks + len(keys), before + int(group.max(initial=-1)) + 1
+    if blocks == 0:
+        nothing = np.zeros(1, np.int64)
+        return BlockLayout(nothing, nothing, nothing, nothing, np.full(width * height, -1, np.int32), width * height)
+    block = np.concatenate(places)
+    return BlockLayout(
+        np.concatenate(faces),
+        image.x[block],
+        image.y[block],
+        np.concatenate(groups),
+        np.concatenate(slots),
+        width * height,
+    )
 
 
 @functools.lru_cache(maxsize=16)
@@ -106,7 +146,12 @@ def atlas_layout(atlas: Atlas) -> BlockLayout:
         numbers[mine] = grid[row[mine] // HEIGHT, column[mine] // WIDTH]
     slots[exists] = (starts[owner] + numbers) * PIXELS + in_block(column % WIDTH, row % HEIGHT)
     return BlockLayout(
-        np.repeat(np.arange(len(sides), dtype=np.int32), counts), x, y, group + np.repeat(before, counts), slots
+        np.repeat(np.arange(len(sides), dtype=np.int32), counts),
+        x,
+        y,
+        group + np.repeat(before, counts),
+        slots,
+        len(slots),
     )
 
 

@@ -1,4 +1,4 @@
-"""The rays of any camera on the device: those of its image, or of camera triangles, which have blocks of their own."""
+"""The rays of any camera on the device: of its image, of its layers if rays are bent, or of camera triangles."""
 
 import functools
 from typing import Any
@@ -6,10 +6,12 @@ from typing import Any
 from mpcam.backend import opaque_numbers, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.capabilities import Bends
 from mpcam.rendering.block_layout import image_layout
 from mpcam.rendering.camera_triangle_rays import camera_triangle_rays
 from mpcam.rendering.device import DeviceMesh
 from mpcam.rendering.device_camera import DeviceCamera, device_camera
+from mpcam.rendering.layered_rays import layered_rays
 from mpcam.rendering.ray_blocks import DeviceRays, bounded, family, gathered, rows_for
 
 
@@ -17,7 +19,8 @@ def device_rays(camera: Camera, device: DeviceMesh, planes: bool = False) -> Dev
     """Rays of a camera in the unit of a device mesh; planes: with what bounds images on planes of camera triangles."""
     if isinstance(camera, CameraTriangles):
         return camera_triangle_rays(camera, device, planes)
-    return image_rays(device_camera(camera), device.scale)
+    known = device_camera(camera)
+    return layered_rays(known, device.scale) if isinstance(camera, Bends) else image_rays(known, device.scale)
 
 
 def image_rays(camera: DeviceCamera, scale: float) -> DeviceRays:

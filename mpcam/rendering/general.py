@@ -12,9 +12,8 @@ from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.math.pose import frame_origin
 from mpcam.rendering.clock import Clock
-from mpcam.rendering.device_camera import around, posed_rays
+from mpcam.rendering.device_camera import around, looks_from
 from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
@@ -68,7 +67,7 @@ class GeneralRasterizer(Moving):
                 f"bound={self.bound!r} is for camera triangles, not for a {type(camera).__name__}: use bound='tight'"
             )
         if not isinstance(camera, CameraTriangles):
-            self._look_from(frame_origin(posed_rays(camera).pose))
+            self._look_from(looks_from(camera))
         self.camera, self.rays = camera, device_rays(camera, self.device, self.bound != "tight")
         self.pose = self.device.pose(around(camera, self.rays.anchor))
         from mpcam_kernels.candidates import levels
@@ -118,8 +117,9 @@ class GeneralRasterizer(Moving):
         return tuple(timed_steps(self.stages(), self.method))
 
     def _decoded(self, keys: Any) -> Any:
-        slots = self.rays.slots
-        found = _frozen_decode(self.output)(slots, keys, self.unit)
+        slots = self.rays.slots(keys)
+        pieces = self.rays.blocks.rays if self.rays.bent else None
+        found = _frozen_decode(self.output)(slots, keys, self.unit, pieces)
         if self.output == "depth":
             return DepthMap(self.camera, found[0])
         if self.output == "coverage":
@@ -138,7 +138,8 @@ class GeneralRasterizer(Moving):
             tests, rendered = self._count(vertices, rays, pose)
             return Stats(int(tests), int(rendered))
 
-        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, lambda: rays.posed(camera))
+        view = None if rays.bent else lambda: rays.posed(camera)
+        return Hits(camera, self.mesh, self.method, triangle, depth, weights, stats, view)
 
     @exclusive
     def _count(self, vertices: Any, rays: DeviceRays, pose: Any) -> np.ndarray:
@@ -171,7 +172,7 @@ def _pipeline(
 
 @functools.cache
 def _frozen_decode(output: str) -> Any:
-    """Kernel from keys to what a frame holds, pixels row by row."""
+    """Kernel from keys to what a frame holds, pixels row by row; depths count from the starts of pieces, if any."""
     import drjit as dr
 
     from mpcam_kernels import decode
@@ -181,10 +182,12 @@ def _frozen_decode(output: str) -> Any:
     kind = KINDS[output]
 
     @frozen
-    def decoded(slots: Any, keys: Any, unit: Any) -> tuple[Any, ...]:
+    def decoded(slots: Any, keys: Any, unit: Any, pieces: Any) -> tuple[Any, ...]:
         t = types()
-        found = dr.gather(kind.kind(t), keys, t.UInt(dr.maximum(slots, 0)), slots >= 0)
-        return decode.frame(t, kind, found, unit)
+        slot, exists = t.UInt(dr.maximum(slots, 0)), slots >= 0
+        found = dr.gather(kind.kind(t), keys, slot, exists)
+        start = None if pieces is None else pieces.start(t, slot, exists)
+        return decode.frame(t, kind, found, unit, start)
 
     return decoded
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Bends
 from mpcam.cameras.types import PosedRays
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.device_camera import posed_rays
+from mpcam.rendering.layered_rays import bent_view
 
 
 @dataclass(frozen=True)
@@ -60,9 +62,11 @@ class Hits:
     @cached_property
     @exclusive
     def view(self) -> PosedRays:
-        """The rays; those of the camera unless something else found the hits."""
+        """The rays; those of the camera unless something else found the hits. Of bent rays the pieces that hit."""
         if self._view:
             return self._view()
+        if isinstance(self.camera, Bends):
+            return bent_view(self.camera, self.device_depth)
         return posed_rays(self.camera)
 
     @cached_property

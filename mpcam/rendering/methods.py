@@ -3,7 +3,7 @@
 from typing import Any, Literal, Protocol, Unpack, overload
 
 from mpcam.cameras.base import Camera
-from mpcam.cameras.capabilities import HasRays, need
+from mpcam.cameras.capabilities import Bends, HasRays, need
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.explanation import Step
@@ -98,6 +98,10 @@ def prepare(
             f"camera is a {type(camera).__name__}: give one of mpcam's cameras, e.g. mpcam.Radial.paraboloid"
         )
     need(camera, HasRays, "a frame")
+    if isinstance(camera, Bends) and camera.ray_geometry != "general":
+        raise InputError(
+            f"rays of a {type(camera).__name__} bend, but its ray_geometry is {camera.ray_geometry!r}, not 'general'"
+        )
     if not isinstance(mesh, Mesh):
         mesh = Scene.of(mesh).mesh
     if method not in METHODS:

@@ -18,8 +18,9 @@ from mpcam.rendering.device_camera import around
 class DeviceRays:
     """Rays of a camera's pixels, in the camera's axes, from an anchor, in the unit of a device mesh.
 
-    kind: "central" where all leave from the anchor, else "general". anchor (3,): camera frame, scene units. blocks: a
-    `mpcam_kernels.ray_blocks.RayBlocks`. rows: gives the rays of the pixels row by row, from the anchor, scene units.
+    kind: "central" where all leave from the anchor, "bent" for pieces of bent rays, else "general". anchor (3,): camera
+    frame, scene units. blocks: a `mpcam_kernels.ray_blocks.RayBlocks`. rows: gives the rays of the pixels row by row,
+    from the anchor, scene units; of bent rays the last pieces.
     """
 
     layout: BlockLayout
@@ -29,14 +30,41 @@ class DeviceRays:
     rows: Callable[[], Any]
 
     @property
-    def slots(self) -> Any:
-        """Int, the slot of each pixel row by row, -1 where there is none."""
-        return self.layout.on_device["slots"]
+    def bent(self) -> bool:
+        """Whether these are pieces of bent rays, in layers."""
+        return self.kind == "bent"
+
+    def slots(self, keys: Any) -> Any:
+        """Int, the slot of each pixel row by row, -1 where there is none; of bent rays the one that keys decide for."""
+        return first_hits(self.layout, keys) if self.bent else self.layout.on_device["slots"]
 
     @exclusive
     def posed(self, camera: Camera) -> PosedRays:
         """The rays in scene units; camera: the one whose rays they are, at any pose."""
         return PosedRays(around(camera, self.anchor), self.rows())
+
+
+def first_hits(layout: BlockLayout, keys: Any) -> Any:
+    """Int, the slot of each pixel's first piece that hits something; of its last one if none does, -1 without any."""
+    import drjit as dr
+
+    fixed = layout.on_device
+    slots = _frozen_first(type(keys))(fixed["pixels"], fixed["slots"], fixed["layers"], keys)
+    dr.eval(slots)
+    return slots
+
+
+@functools.cache
+def _frozen_first(kind: type) -> Any:
+    """Kernel that finds the first piece with a hit, for one type of keys."""
+    from mpcam_kernels.frozen import frozen
+    from mpcam_kernels.ray_pieces import first_hit
+
+    @frozen
+    def first(pixel: Any, slots: Any, layers: tuple[Any, Any], keys: Any) -> Any:
+        return first_hit(types(), kind, pixel, slots, *layers, keys)
+
+    return first
 
 
 def family(kind: str) -> Any:

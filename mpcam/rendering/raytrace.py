@@ -4,35 +4,24 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.capabilities import Bends
 from mpcam.cameras.types import PosedRays, Ray
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.math.pose import frame_origin
 from mpcam.rendering.clock import Clock
 from mpcam.rendering.device import in_frame
-from mpcam.rendering.device_camera import posed_rays, world_rays
+from mpcam.rendering.device_camera import looks_from, posed_rays, world_rays
 from mpcam.rendering.device_rays import device_rays
 from mpcam.rendering.explanation import Step, timed_steps
 from mpcam.rendering.hits import Hits, Stats
 from mpcam.rendering.moving import Moving
+from mpcam.rendering.traced_rays import bent_rays, straight_rays
 from mpcam.tracing.meshes import mitsuba_mesh, move, position_key
 from mpcam.tracing.variant import mitsuba
-
-
-def rays_around(posed: PosedRays, origin: np.ndarray, unit: float) -> tuple[Any, Any, Any]:
-    """Origin, direction and validity of rays, row by row, in world axes around a point (3,) in a unit."""
-    rotation = posed.pose[:3, :3]
-    numbers = opaque_numbers([*rotation.ravel(), *((rotation @ origin + posed.pose[:3, 3]) / unit), 1.0 / unit])
-    columns, shift, scale = [numbers[i:9:3] for i in range(3)], numbers[9:12], numbers[12]
-
-    def turned(vector: Any) -> list[Any]:
-        return [sum(column[j] * vector[j] for j in range(3)) for column in columns]
-
-    start = [posed.ray.origin[i] * scale - shift[i] for i in range(3)]
-    return turned(start), turned(posed.ray.direction), posed.ray.valid
 
 
 class RayTraced(Moving):
@@ -40,9 +29,9 @@ class RayTraced(Moving):
 
     The same rays and the same float32 vertices as the kernels use; but where something is far away, rays and vertices
     are brought to float32 around the point that the rays leave from, not as the other methods do it, so that comparing
-    with them shows what rounding costs. Triangles with a corner that is not finite are left out of the tree, which may
-    not hold such numbers. rays: others than the camera's, in the world, one for each of its pixels, row by row: origin
-    (N, 3), unit direction (N, 3), valid (N,).
+    with them shows what rounding costs. Bent rays are traced piece by piece, each up to its end. Triangles with a
+    corner that is not finite are left out of the tree, which may not hold such numbers. rays: others than the camera's,
+    in the world, one for each of its pixels, row by row: origin (N, 3), unit direction (N, 3), valid (N,).
     """
 
     method = "raytrace"
@@ -58,7 +47,8 @@ class RayTraced(Moving):
 
     def _near(self) -> np.ndarray:
         """The point that all is put around: near that of the rays, and the same for cameras near to each other."""
-        middle, unit = frame_origin(self._posed.pose), self.device.scale
+        unit = self.device.scale
+        middle = looks_from(self.camera) if self._posed is None else frame_origin(self._posed.pose)
         if isinstance(self.camera, CameraTriangles) and self._given is None:
             return middle
         if self.device.stands_apart(self.mesh, middle) is not None:
@@ -81,21 +71,24 @@ class RayTraced(Moving):
             self._build()
         self._look()
 
-    def _own_rays(self) -> PosedRays:
-        """Those of the camera; of camera triangles around the mesh's anchor, so that rays may start on its faces."""
+    def _own_rays(self) -> PosedRays | None:
+        """Those of the camera; of camera triangles around the mesh's anchor, so that rays may start on its faces.
+
+        None for bent rays.
+        """
+        if isinstance(self.camera, Bends):
+            return None
         if isinstance(self.camera, CameraTriangles):
             return device_rays(self.camera, self.device).posed(self.camera)
         return posed_rays(self.camera)
 
     def _look(self) -> None:
         """The rays around the origin, in its unit."""
-        import drjit as dr
-
         with mitsuba() as mi:
-            world, along, valid = rays_around(self._posed, self._origin, self._unit)
-            self._ray = mi.Ray3f(mi.Point3f(*map(mi.Float, world)), mi.Vector3f(*map(mi.Float, along)))
-            self._valid = mi.Bool(valid)
-            dr.eval(self._ray, self._valid)
+            if self._posed is None:
+                self._rays = bent_rays(mi, self.camera, self._origin, self._unit)
+            else:
+                self._rays = straight_rays(mi, self._posed, self._origin, self._unit)
 
     def _build(self) -> None:
         """A scene of the faces whose corners are finite."""
@@ -144,23 +137,25 @@ class RayTraced(Moving):
         """One frame, evaluated."""
         import drjit as dr
 
-        t, posed = types(), self._posed
-        with mitsuba() as mi:
-            if self._scene is None:
-                count = self.camera.width * self.camera.height
-                triangle, depth = dr.full(t.Int, -1, count), dr.full(t.Float, dr.inf, count)
-                second, third = dr.zeros(t.Float, count), dr.zeros(t.Float, count)
-            else:
-                found = self._scene.ray_intersect_preliminary(self._ray, coherent=True, active=self._valid)
-                hit = self._valid & found.is_valid()
-                number = t.UInt(dr.detach(found.prim_index))
+        t, posed, count = types(), self._posed, self.camera.width * self.camera.height
+        triangle, depth = dr.full(t.Int, -1, count), dr.full(t.Float, dr.inf, count)
+        second, third = dr.zeros(t.Float, count), dr.zeros(t.Float, count)
+        with mitsuba():
+            for rays in self._rays:
+                if self._scene is None:
+                    break
+                wanted = rays.valid & (triangle < 0)
+                found = self._scene.ray_intersect_preliminary(rays.ray, coherent=True, active=wanted)
+                hit, number = t.Bool(wanted & found.is_valid()), t.UInt(dr.detach(found.prim_index))
                 if self._kept is not None:
-                    number = dr.gather(t.UInt, self._kept, number, t.Bool(hit))
-                triangle = dr.select(t.Bool(hit), t.Int(number), -1)
-                depth = dr.select(t.Bool(hit), t.Float(dr.detach(found.t)) * self.unit, dr.inf)
-                second, third = (dr.select(t.Bool(hit), t.Float(dr.detach(w)), 0.0) for w in found.prim_uv)
-            dr.eval(triangle, depth, second, third)
-            del mi
+                    number = dr.gather(t.UInt, self._kept, number, hit)
+                away = t.Float(dr.detach(found.t))
+                away = away if rays.start is None else away + rays.start
+                triangle, depth = dr.select(hit, t.Int(number), triangle), dr.select(hit, away * self.unit, depth)
+                weights = (t.Float(dr.detach(weight)) for weight in found.prim_uv)
+                second, third = (dr.select(hit, new, old) for new, old in zip(weights, (second, third), strict=True))
+                dr.eval(triangle, depth, second, third)
+        view = None if posed is None else lambda: posed
         return Hits(
             self.camera,
             self.mesh,
@@ -169,7 +164,7 @@ class RayTraced(Moving):
             depth,
             lambda: (second, third),
             lambda: Stats(0, 0),
-            lambda: posed,
+            view,
         )
 
     @exclusive

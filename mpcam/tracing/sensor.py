@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Bends
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.checks import whole_number
 from mpcam.errors import InputError
@@ -29,9 +30,11 @@ def sensor(
 
     samples: per pixel. centered: every sample goes through its pixel's center, as the rasterizer's do. film: other
     settings of the high dynamic range film (it has a box filter of one pixel, float32, and no alpha by default).
+    Raises InputError for a camera whose rays bend: a sensor gives Mitsuba one straight ray.
     """
     if not isinstance(camera, Camera):
         raise InputError(f"sensor(camera={type(camera).__name__}): give one of mpcam's cameras")
+    _check_straight(camera)
     samples = whole_number("samples", samples, 1, of="sensor")
     settings = {
         "type": "hdrfilm",
@@ -86,6 +89,15 @@ def _read(text: str) -> Camera:
         ) from None
 
 
+def _check_straight(camera: Camera) -> None:
+    """See that a sensor can give the rays of a camera."""
+    if isinstance(camera, Bends):
+        raise InputError(
+            f"sensor mpcam: rays of a {type(camera).__name__} bend, and Mitsuba takes one straight ray of each pixel: "
+            "use mpcam.rasterize(camera, mesh, method='raytrace'), which has it trace them piece by piece"
+        )
+
+
 def _sensor_class(mi: Any) -> type:
     """The plugin for the variant in force."""
     import drjit as dr
@@ -96,6 +108,7 @@ def _sensor_class(mi: Any) -> type:
             if "camera" not in properties:
                 raise InputError("sensor mpcam: the string 'camera' is missing; see mpcam.truth.sensor(camera)")
             self.camera = _read(str(properties["camera"]))
+            _check_straight(self.camera)
             self.centered = bool(properties.get("centered", False))
             size = self.film().size()
             if (int(size[0]), int(size[1])) != (self.camera.width, self.camera.height):
