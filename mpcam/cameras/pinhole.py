@@ -11,7 +11,8 @@ from mpcam.cameras.types import Box, Domain, Projection, Ray, RayGeometry
 from mpcam.errors import InputError, KeyProblem
 from mpcam.math import PI, Array, Vector, epsilon, isfinite, maximum, minimum, norm, normalize, tan, vector, where
 
-_FAR = 1e9  # pixels; stands for infinity in boxes, so that no arithmetic on boxes makes NaN
+FAR = 1e9
+"""Pixels that stand for infinity in boxes, so that no arithmetic on boxes makes NaN."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -104,31 +105,8 @@ class Pinhole(Camera):
         return vector(self.cx + self.fx * (x / depth), self.cy + self.fy * (y / depth)), front
 
     def local_bound(self, a: Vector, b: Vector, c: Vector) -> Box:
-        """Exact box of the part in front of the camera plane; unbounded sides are at +-1e9 pixels.
-
-        An edge that crosses the camera plane at (x, y, 0) runs to infinity along (x, y).
-        """
-        finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
-        a, b, c = (vector(*(where(finite, corner[i], 1.0) for i in range(3))) for corner in (a, b, c))
-        low, high = [_FAR, _FAR], [-_FAR, -_FAR]
-        focal, center = (self.fx, self.fy), (self.cx, self.cy)
-        for corner in (a, b, c):
-            front = corner[2] > 0
-            depth = where(front, corner[2], 1.0)
-            for i in range(2):
-                image = maximum(minimum(center[i] + focal[i] * (corner[i] / depth), _FAR), -_FAR)
-                low[i] = minimum(low[i], where(front, image, _FAR))
-                high[i] = maximum(high[i], where(front, image, -_FAR))
-        for p, q in ((a, b), (b, c), (c, a)):
-            crosses = (p[2] > 0) != (q[2] > 0)
-            for i in range(2):
-                toward = p[i] * q[2] - q[i] * p[2]  # sign of the crossing point's coordinate, times that of q[2] - p[2]
-                toward = where(q[2] > p[2], toward, -toward)
-                slack = 4 * epsilon(toward) * (abs(p[i] * q[2]) + abs(q[i] * p[2]))
-                low[i] = where(crosses & (toward <= slack), -_FAR, low[i])
-                high[i] = where(crosses & (toward >= -slack), _FAR, high[i])
-        valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
-        return Box(vector(*low), vector(*high), valid)
+        """Exact box of the part in front of the camera plane; unbounded sides are at +-1e9 pixels."""
+        return perspective_box((self.fx, self.fy), (self.cx, self.cy), a, b, c)
 
     def local_vertex_view(self, point: Vector) -> VertexView:
         """What a vertex knows of the projection around it, for `local_outline`."""
@@ -145,3 +123,30 @@ class Pinhole(Camera):
     def local_bound_rough(self, a: Vector, b: Vector, c: Vector) -> Box:
         """The box for triangles of which `local_outline` is not sure."""
         return self.local_bound(a, b, c)
+
+
+def perspective_box(focal: tuple[Array, Array], center: tuple[Array, Array], a: Vector, b: Vector, c: Vector) -> Box:
+    """Exact box of the part of a triangle in front of the camera plane; unbounded sides are at +-1e9 pixels.
+
+    An edge that crosses the camera plane at (x, y, 0) runs to infinity along (x, y).
+    """
+    finite = isfinite(sum(corner[i] for corner in (a, b, c) for i in range(3)))
+    a, b, c = (vector(*(where(finite, corner[i], 1.0) for i in range(3))) for corner in (a, b, c))
+    low, high = [FAR, FAR], [-FAR, -FAR]
+    for corner in (a, b, c):
+        front = corner[2] > 0
+        depth = where(front, corner[2], 1.0)
+        for i in range(2):
+            image = maximum(minimum(center[i] + focal[i] * (corner[i] / depth), FAR), -FAR)
+            low[i] = minimum(low[i], where(front, image, FAR))
+            high[i] = maximum(high[i], where(front, image, -FAR))
+    for p, q in ((a, b), (b, c), (c, a)):
+        crosses = (p[2] > 0) != (q[2] > 0)
+        for i in range(2):
+            toward = p[i] * q[2] - q[i] * p[2]  # sign of the crossing point's coordinate, times that of q[2] - p[2]
+            toward = where(q[2] > p[2], toward, -toward)
+            slack = 4 * epsilon(toward) * (abs(p[i] * q[2]) + abs(q[i] * p[2]))
+            low[i] = where(crosses & (toward <= slack), -FAR, low[i])
+            high[i] = where(crosses & (toward >= -slack), FAR, high[i])
+    valid = finite & ((a[2] > 0) | (b[2] > 0) | (c[2] > 0))
+    return Box(vector(*low), vector(*high), valid)

@@ -10,6 +10,8 @@ from functools import partial
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Bends
+from mpcam.cameras.types import Ray
 from mpcam.math.pose import look_at
 from mpcam.stress.report import Case, StressRow
 
@@ -94,13 +96,31 @@ def distant(
         there = Mesh.concatenate([there, Mesh(face, [(0, 1, 2)])])
     hits = rasterize(camera, there)
     u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    ray = camera.ray(np.stack([u, v], -1))
-    origin, direction = np.asarray(ray.origin) - place, np.asarray(ray.direction)
-    nearest = -(origin * direction).sum(-1)
-    passing = np.linalg.norm(origin + nearest[..., None] * direction, axis=-1)
     found, depth = np.asarray(hits.triangle) >= 0, np.asarray(hits.depth, np.float64)
-    inside = ray.valid & (passing < inner - slack) & (nearest > 0)
-    outside = ~ray.valid | (passing > outer + slack)
-    half = np.sqrt(np.maximum(outer**2 - passing**2, 0)), np.sqrt(np.maximum(inner**2 - passing**2, 0))
-    off = found & inside & ((depth < nearest - half[0] - slack) | (depth > nearest - half[1] + slack))
+    inside, off, outside = np.zeros(u.shape, bool), np.zeros(u.shape, bool), np.ones(u.shape, bool)
+    for ray, start, end in _pieces(camera, np.stack([u, v], -1)):
+        origin, direction = np.asarray(ray.origin) - place, np.asarray(ray.direction)
+        nearest = -(origin * direction).sum(-1)
+        passing = np.linalg.norm(origin + nearest[..., None] * direction, axis=-1)
+        half = np.sqrt(np.maximum(outer**2 - passing**2, 0)), np.sqrt(np.maximum(inner**2 - passing**2, 0))
+        length = end - start
+        # The first hit is sure where the piece reaches it, from outside, and nothing is where it stays outside.
+        through = ray.valid & (passing < inner - slack) & (nearest > half[0] + slack) & (nearest - half[1] < length)
+        closest = np.clip(nearest, 0, np.where(ray.valid, length, 0))
+        away = np.linalg.norm(origin + closest[..., None] * direction, axis=-1)
+        first = through & outside  # no piece before it came near
+        near, far = (start + nearest - part for part in half)
+        off |= found & first & ((depth < near - slack) | (depth > far + slack))
+        inside, outside = inside | through, outside & (~ray.valid | (away > outer + slack))
     return int((inside | outside).sum()), int((inside & ~found).sum()), int((outside & found).sum() + off.sum())
+
+
+def _pieces(camera: Camera, pixel: np.ndarray) -> list[tuple[Ray, np.ndarray, np.ndarray]]:
+    """The straight pieces of the rays of pixels, in order, with the lengths at which they start and end."""
+    if not isinstance(camera, Bends):
+        ray = camera.ray(pixel)
+        return [(ray, np.zeros(ray.valid.shape), np.full(ray.valid.shape, np.inf))]
+    given = camera.ray_pieces(pixel)
+    along = range(np.shape(given.start)[-1])
+    rays = [Ray(given.origin[..., k, :], given.direction[..., k, :], given.valid[..., k]) for k in along]
+    return [(ray, given.start[..., k], given.end[..., k]) for k, ray in enumerate(rays)]
