@@ -241,7 +241,12 @@ class Camera:
         object.__setattr__(self, name, number)
 
 
-_waiting: list[type[Camera]] = []  # models that JAX does not know yet
+_waiting: list[type] = []  # models that JAX does not know yet
+
+
+def register_later(part: type) -> None:
+    """Make a dataclass that fields of cameras hold a JAX pytree too; it has `static_fields` as cameras do."""
+    _waiting.append(part)
 
 
 def register_pytrees() -> None:

@@ -4,7 +4,7 @@ Rays alone are enough to be rasterized exactly, traced, written and compared. Ev
 gives it more methods. The maps here are those in the camera's own frame, components first.
 """
 
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -31,6 +31,16 @@ class Bends(Protocol):
     pieces_per_ray: int
 
     def local_ray_pieces(self, pixel: Vector) -> tuple[RayPieces, ...]: ...
+
+
+@runtime_checkable
+class HasKernels(Protocol):
+    """A form of its own for kernels: a dataclass of Dr.Jit arrays and numbers, with the maps that the camera has.
+
+    number: the type of its numbers.
+    """
+
+    def for_kernels(self, number: type) -> Any: ...
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ from mpcam.cameras.radial import Radial
 from mpcam.errors import InputError
 
 PROJECTIONS = (*PROFILES, "pinhole")
-_LENGTHS = ("fx", "fy", "radius", "scale")
+_LENGTHS = ("fx", "fy", "radius", "scale", "shift_near", "shift_far")
 _CENTER = {"cx": "width", "cy": "height"}
 
 
@@ -27,9 +27,13 @@ def resized(camera: Any, width: int, height: int) -> Any:
     factor = min(width, height) / min(camera.width, camera.height)
     changes: dict[str, Any] = {"width": width, "height": height}
     changes |= {name: factor * getattr(camera, name) for name in lengths}
-    for name in names & _CENTER.keys():
-        side = _CENTER[name]
-        changes[name] = 0.5 * changes[side] + factor * (getattr(camera, name) - 0.5 * getattr(camera, side))
+
+    def moved(place: Any, side: str) -> Any:
+        return 0.5 * changes[side] + factor * (place - 0.5 * getattr(camera, side))
+
+    changes |= {name: moved(getattr(camera, name), _CENTER[name]) for name in names & _CENTER.keys()}
+    if "pole" in names:
+        changes["pole"] = tuple(map(moved, camera.pole, _CENTER.values()))
     return dataclasses.replace(camera, **changes)
 
 

@@ -65,6 +65,8 @@ def plain_type(kind: Any) -> Any:
         return list[plain_type(get_args(kind)[0])]
     if get_origin(kind) is Literal or kind in (bool, int, float, str, NoneType):
         return kind
+    if dataclasses.is_dataclass(kind):  # a table
+        return kind
     parts = with_parts(kind, plain_type)
     return float | str | list[float] if parts is kind else parts
 

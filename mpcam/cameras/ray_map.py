@@ -7,7 +7,7 @@ import numpy as np
 
 from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.bilinear import Line, Patch, patch
-from mpcam.cameras.capabilities import HasRays, need
+from mpcam.cameras.capabilities import Bends, HasRays, need
 from mpcam.cameras.ray_search import Made, search
 from mpcam.cameras.symmetric import finite_pixel
 from mpcam.cameras.types import Domain, Projection, Ray
@@ -60,7 +60,15 @@ class RayMap(Camera):
 
     @classmethod
     def of(cls, camera: Camera, images: int = 4) -> Self:
-        """The rays of another camera at the centers of its pixels, in its frame and with its pose."""
+        """The rays of another camera at the centers of its pixels, in its frame and with its pose.
+
+        Raises InputError for a camera whose rays bend.
+        """
+        if isinstance(camera, Bends):
+            raise InputError(
+                f"RayMap.of(): rays of a {type(camera).__name__} bend, and a ray map has one straight ray a pixel: "
+                "take one of the pieces that camera.ray_pieces(pixel) gives"
+            )
         local_ray = need(camera, HasRays, "RayMap.of()").local_ray
         v, u = np.indices((camera.height, camera.width)) + 0.5
         with np.errstate(invalid="ignore", over="ignore"):

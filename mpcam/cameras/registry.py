@@ -22,8 +22,10 @@ from mpcam.cameras.field_of_view import FieldOfView as FieldOfView
 from mpcam.cameras.panorama import Panorama as Panorama
 from mpcam.cameras.general_linear import GeneralLinear as GeneralLinear
 from mpcam.cameras.general_linears import GeneralLinears as GeneralLinears
+from mpcam.cameras.single_pole import SinglePoleOcclusion as SinglePoleOcclusion
 from mpcam.cameras.ray_map import RayMap as RayMap
 from mpcam.cameras.camera_triangles import CameraTriangles as CameraTriangles
+from mpcam.cameras.graph import GraphCamera as GraphCamera
 # isort: on
 
 MODELS: dict[str, type[Camera]] = {

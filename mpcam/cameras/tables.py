@@ -5,6 +5,7 @@ The keys of a model come from its dataclass fields; a model that is written in a
 cameras have is not among them: the size, which comes first, and the pose.
 """
 
+import dataclasses
 import inspect
 import math
 from collections.abc import Mapping
@@ -79,7 +80,7 @@ def arguments(model: type, width: int, height: int, keys: Mapping[str, Any]) -> 
 
 
 def plain_value(value: Any) -> Any:
-    """A field's value as numbers, texts and nested lists; raises InputError for a user's own function."""
+    """A field's value as numbers, texts, lists and tables of them; raises InputError for a user's own function."""
     if isinstance(value, Profile):
         if PROFILES.get(value.name) is not value:
             raise InputError(
@@ -89,6 +90,8 @@ def plain_value(value: Any) -> Any:
         return value.name
     if isinstance(value, (list, tuple)):
         return [plain_value(item) for item in value]
+    if dataclasses.is_dataclass(value):
+        return {field.name: plain_value(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if hasattr(value, "shape"):
         table = np.asarray(value)
         return (table if table.dtype.kind in "biu" else table.astype(np.float64)).tolist()

@@ -1,7 +1,8 @@
 """Tables [camera] of scene files: one for each model in the register of cameras, with the keys that the model takes."""
 
+import dataclasses
 import functools
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from msgspec import Meta, Struct, defstruct
 
@@ -80,4 +81,16 @@ def _limited(kind: Any) -> Any:
             return base
         limits: Any = {"gt": ends.above, "lt": ends.below, "ge": ends.at_least, "le": ends.at_most}
         return Annotated[base, Meta(**limits)]
-    return with_parts(kind, _limited)
+    return _table(kind) if dataclasses.is_dataclass(kind) else with_parts(kind, _limited)
+
+
+@functools.cache
+def _table(kind: Any) -> type[Struct]:
+    """The type of a table within a camera's, from a dataclass with its keys."""
+    hints, fields = get_type_hints(kind, include_extras=True), []
+    for field in dataclasses.fields(kind):
+        given = _limited(hints[field.name])
+        fields.append(
+            (field.name, given) if field.default is dataclasses.MISSING else (field.name, given, field.default)
+        )
+    return defstruct(kind.__name__, fields, bases=(Table,), frozen=True, kw_only=True)

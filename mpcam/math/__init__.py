@@ -20,10 +20,12 @@ from mpcam.math.arrays import sin as sin
 from mpcam.math.arrays import smallest as smallest
 from mpcam.math.arrays import sqrt as sqrt
 from mpcam.math.arrays import take as take
+from mpcam.math.arrays import take_row as take_row
 from mpcam.math.arrays import tan as tan
 from mpcam.math.arrays import where as where
 from mpcam.math.arrays import whole as whole
 from mpcam.math.roots import central_slope as central_slope
+from mpcam.math.roots import counted as counted
 from mpcam.math.roots import first_true as first_true
 from mpcam.math.roots import invert_increasing as invert_increasing
 from mpcam.math.roots import polynomial as polynomial

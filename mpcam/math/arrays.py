@@ -121,6 +121,21 @@ def take(table: Array, index: Array) -> Array:
     return table[index]
 
 
+def take_row(table: Array, index: Array) -> tuple[Array, ...]:
+    """Row number `index` of a table (N, 4), of its library, as four components; Dr.Jit tables are flat, (4 N,)."""
+    if library(table) == "drjit":
+        dr = sys.modules["drjit"]
+        kind = getattr(sys.modules[type(table).__module__], "Array4f64" if epsilon(table) == 2.0**-52 else "Array4f")
+        return tuple(dr.gather(kind, table, dr.uint32_array_t(type(table))(index)))
+    if library(index) == "jax" and library(table) == "numpy":
+        import jax
+
+        table = jax.numpy.asarray(table, jax.dtypes.canonicalize_dtype(table.dtype))
+    if type(index) is int and library(table) == "numpy":
+        return tuple(table[index].tolist())  # Python's numbers do not seize the arithmetic
+    return tuple(table[index, k] for k in range(4))
+
+
 def whole(x: Array) -> Array:
     """Numbers that are not negative, cut to whole ones of 32 bits."""
     if library(x) == "drjit":

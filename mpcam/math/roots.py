@@ -1,5 +1,6 @@
 """Bracketed root finding with a fixed number of steps and no branches, alike for NumPy, JAX and Dr.Jit arrays."""
 
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -76,6 +77,27 @@ def repeat(step: Callable[[Any], Any], state: Any, steps: int) -> Any:
         return jax.lax.fori_loop(0, steps, lambda _, state: step(state), state)
     for _ in range(steps):
         state = step(state)
+    return state
+
+
+def counted(step: Callable[[Any, Any], Any], state: Any, steps: int, unrolled: int = 8) -> Any:
+    """The state, a tuple of arrays, after step(number, state) for each number below `steps`.
+
+    JAX compiles one step only; Dr.Jit records a loop where there are more than `unrolled`.
+    """
+    kind = library(*state)
+    if kind == "jax" and steps > 1:
+        import jax
+
+        return jax.lax.fori_loop(0, steps, lambda number, state: step(number.astype("int32"), state), state)
+    if kind == "drjit" and steps > unrolled:
+        dr = sys.modules["drjit"]
+        first = dr.int32_array_t(dr.leaf_t(type(state[0])))(0)
+        return dr.while_loop(
+            (first, *state), lambda number, *_: number < steps, lambda number, *now: (number + 1, *step(number, now))
+        )[1:]
+    for number in range(steps):
+        state = step(number, state)
     return state
 
 

@@ -9,10 +9,13 @@ import numpy as np
 
 from mpcam.backend import opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
+from mpcam.cameras.capabilities import Bends, HasKernels
 from mpcam.cameras.profiles import Profile
 from mpcam.cameras.types import PosedRays, Ray
 from mpcam.errors import InputError
 from mpcam.math import library
+from mpcam.math.pose import frame_origin
+from mpcam.rendering.pixel_pieces import PixelPieces, pixel_pieces
 from mpcam.rendering.pixel_rays import pixel_rays
 
 
@@ -27,6 +30,8 @@ def _plain(value: Any) -> Any:
     """Numbers of any library, tables and tuples of them in a hashable form, the same for the same ones."""
     if isinstance(value, tuple):
         return tuple(_plain(v) for v in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, Profile):
+        return tuple(_plain(getattr(value, field.name)) for field in dataclasses.fields(value))
     if value is None or isinstance(value, (str, int, Profile)):
         return value
     return _Table(value) if np.ndim(value) > 0 else float(value)
@@ -58,7 +63,8 @@ def _numbers(camera: Camera) -> dict[str, Any]:
 def unposed(camera: Camera) -> Camera:
     """The camera at the identity pose with its numbers on the device, for use inside of kernels."""
     result, values = copy.copy(camera), _numbers(camera)
-    object.__setattr__(result, "camera_from_world", None)
+    for name in ("camera_from_world", *camera.host_fields):  # arrays of NumPy, which frozen kernels cannot tell apart
+        object.__setattr__(result, name, None)
     numbers = [float(v) for value in values.values() for v in (value if isinstance(value, tuple) else (value,))]
     on_device = iter(opaque_numbers(numbers))
     for name, value in values.items():
@@ -68,9 +74,21 @@ def unposed(camera: Camera) -> Camera:
 
 
 def on_device(camera: Camera) -> Camera:
-    """The camera as kernels take it: `unposed`, but for models that consist of tables, which are as they are."""
+    """The camera as kernels take it: what it has `for_kernels`, or `unposed`; other models of tables as they are."""
+    if isinstance(camera, HasKernels):
+        return _opaque(camera.for_kernels(types().Float))
     plain = all(np.ndim(value) == 0 for value in _numbers(camera).values() if not isinstance(value, tuple))
     return unposed(camera) if plain else camera
+
+
+def _opaque(tables: Any) -> Any:
+    """A dataclass of device arrays and numbers as one of which kernels take nothing for granted but whole numbers."""
+    values = {field.name: getattr(tables, field.name) for field in dataclasses.fields(tables)}
+    numbers = [name for name, value in values.items() if isinstance(value, float)]
+    found = dict(zip(numbers, opaque_numbers([values[name] for name in numbers]), strict=True))
+    arrays = {name: value for name, value in values.items() if library(value) == "drjit"}
+    found |= {name: value + type(value)(opaque_zero()) for name, value in arrays.items()}
+    return dataclasses.replace(tables, **found)
 
 
 def _check_profile(profile: Any) -> None:
@@ -96,7 +114,7 @@ class DeviceCamera:
     """Rays and kernels' view of a camera, which hold for every pose of it.
 
     ray: of each pixel, row by row, on the device, in the camera's frame, from `anchor` (3,), a point of that frame.
-    kept: what others make of the rays.
+    pieces: those of bent rays. kept: what others make of the rays.
     """
 
     def __init__(self, camera: Camera):
@@ -105,7 +123,23 @@ class DeviceCamera:
         self.kept: dict[Any, Any] = {}
         self.on_device = on_device(camera)
         self.central = camera.ray_geometry == "central"
-        self.ray, self.anchor = pixel_rays(self.on_device)
+        self._camera = camera
+
+    @functools.cached_property
+    def _rays(self) -> tuple[Ray, np.ndarray]:
+        return pixel_rays(self.on_device)
+
+    @property
+    def ray(self) -> Ray:
+        return self._rays[0]
+
+    @property
+    def anchor(self) -> np.ndarray:
+        return self._rays[1]
+
+    @functools.cached_property
+    def pieces(self) -> PixelPieces:
+        return pixel_pieces(self._camera)
 
     @functools.cached_property
     def has_center(self) -> bool:
@@ -159,6 +193,12 @@ def posed_rays(camera: Camera) -> PosedRays:
     """The rays of a camera's pixels, in scene units."""
     known = device_camera(camera)
     return PosedRays(around(camera, known.anchor), known.ray)
+
+
+def looks_from(camera: Camera) -> np.ndarray:
+    """A point of the world (3,) near which the rays of a camera start."""
+    known = device_camera(camera)
+    return frame_origin(around(camera, known.pieces.anchor if isinstance(camera, Bends) else known.anchor))
 
 
 def around(camera: Camera, anchor: np.ndarray) -> np.ndarray:
