@@ -14,6 +14,7 @@ from mpcam.experiments.hou2006_solids import Solid, ball, prism
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.shapes import copies as copied
 from mpcam.geometry.shapes import join, lathe, loft, placements, smooth_curve
+from mpcam.geometry.teapot import BODY, HANDLE, LID, SPOUT
 from mpcam.geometry.textures import painted, textured
 from mpcam.math.pose import look_at
 from mpcam.scene.mirror import Mirror
@@ -86,15 +87,9 @@ class TeapotScene:
 @functools.cache
 def teapot(level: int = 96) -> Mesh:
     """A teapot about 1.1 high: body with lid and knob, spout towards +x and handle. level: segments around the body."""
-    body = smooth_curve([(0.45, 0.0), (0.68, 0.12), (0.82, 0.38), (0.76, 0.62), (0.58, 0.78), (0.5, 0.82)], level // 2)
-    lid = smooth_curve(
-        [(0.5, 0.82), (0.34, 0.9), (0.13, 0.95), (0.07, 0.99), (0.12, 1.07), (0.09, 1.14), (0.0, 1.16)], level // 2
-    )
-    spout = smooth_curve([(0.66, 0.0, 0.26), (0.98, 0.0, 0.4), (1.08, 0.0, 0.66), (1.3, 0.0, 0.86)], level // 3)
+    body, lid = smooth_curve(BODY, level // 2), smooth_curve(LID, level // 2)
+    spout, handle = smooth_curve(SPOUT, level // 3), smooth_curve(HANDLE, level // 2)
     thick = np.interp(np.linspace(0, 1, len(spout)), [0, 0.5, 1], [0.2, 0.12, 0.075])
-    handle = smooth_curve(
-        [(-0.68, 0.0, 0.66), (-1.05, 0.0, 0.72), (-1.2, 0.0, 0.5), (-1.05, 0.0, 0.28), (-0.74, 0.0, 0.22)], level // 2
-    )
     parts = [
         lathe(body, level),
         lathe(lid, level),

@@ -1,4 +1,4 @@
-"""The built-in meshes: the four of Gascuel et al. 2008, section 5.1, made procedurally, and plain shapes."""
+"""The built-in meshes, made by formula: those of Gascuel et al. 2008 and Rosen et al. 2011, and plain shapes."""
 
 from importlib import import_module
 from typing import NamedTuple
@@ -26,6 +26,12 @@ _RECIPES = {
     "plane": _Recipe("plain", 2, 2, 2_000_000),
     "cube": _Recipe("plain", 12, 12, 1_200_000),
     "quad_room": _Recipe("plain", 12, 12, 1_200_000),
+    "knot": _Recipe("knot", 20_000, 200, 2_000_000),
+    "teapot": _Recipe("teapot", 20_000, 1_000, 2_000_000),
+    "barrel": _Recipe("barrel", 5_000, 1_000, 1_000_000),
+    "car": _Recipe("car", 12_000, 4_000, 1_000_000),
+    "statue": _Recipe("statue", 60_000, 8_000, 1_000_000),
+    "maze": _Recipe("maze", 20_000, 3_000, 1_000_000),
 }
 
 
@@ -43,8 +49,10 @@ class BuiltinMesh:
         4,000 of 2,200 to 100,000), "characters" (people on a plain ground, 177,000 of 25,000 to 2,000,000), "patio"
         (a furnished courtyard, 560,000 of 60,000 to 3,000,000): stand-ins for the scenes of Gascuel et al. 2008,
         section 5.1, meant to be seen from (0, 0, 1.6). Or "sphere", "plane", "cube", "quad_room" (seen from inside).
-        triangles: the level of detail that comes nearest is made, in the first four within 3 %; the plain shapes only
-        come in 20 * 4**k (sphere), 2 n**2 (plane) and 12 n**2. Raises InputError for other names and numbers.
+        Or single things, closed all round, after those of Rosen et al. 2011: "knot" and "teapot" (20,000 triangles of
+        200 or 1,000 to 2,000,000), "barrel" (5,000), "car" (12,000), "statue" (a dragon, 60,000), "maze" (20,000).
+        triangles: the level of detail that comes nearest is made, within 4 %; the plain shapes only come in 20 * 4**k
+        (sphere), 2 n**2 (plane) and 12 n**2. Raises InputError for other names and numbers.
         """
         recipe = _recipe(name)
         if triangles is None:

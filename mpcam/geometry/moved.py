@@ -59,6 +59,18 @@ def moved(mesh: Mesh, vertices: Any = None, normals: Any = None, transform: Any 
     return _made(mesh, places, lambda: _after(mesh, places))
 
 
+def part_of(mesh: Mesh, base: Mesh, rows: Sequence[slice]) -> Mesh:
+    """A mesh with its vertices, and normals, where they are in some rows of another, which it is a part of."""
+
+    def cut(table: np.ndarray) -> np.ndarray:
+        return table[rows[0]] if len(rows) == 1 else np.concatenate([table[span] for span in rows])
+
+    def normals() -> np.ndarray | None:
+        return None if mesh.normals is None or base.normals is None else cut(mesh.normals)
+
+    return _made(base, cut(mesh.vertices), normals)
+
+
 def begun_anew(mesh: Mesh, first: Mesh) -> Mesh:
     """The mesh with its first vertices, and their normals, where another mesh has them."""
     count, places = len(first.vertices), np.array(mesh.vertices)

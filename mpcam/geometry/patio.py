@@ -5,8 +5,9 @@ Stands in for the scene of that name in Gascuel et al. 2008, section 5.1 (560,00
 
 import numpy as np
 
+from mpcam.geometry.levels import Level
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.patio_furniture import Level, add_furniture
+from mpcam.geometry.patio_furniture import add_furniture
 from mpcam.geometry.patio_plants import add_plants
 from mpcam.geometry.shapes import Builder, MeshPart, boxes, copies, join, lathe, placements, quads, smooth_curve
 from mpcam.geometry.textures import door, painted, planks, plaster, roof_tiles, textured, tiles

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mpcam.geometry.levels import Level
 from mpcam.geometry.shapes import (
     Builder,
     MeshPart,
@@ -18,16 +19,6 @@ from mpcam.geometry.textures import painted, planks, textured, tiles
 
 # middle of each table with its chairs
 _SETS = [(2.6, -3.3), (-2.6, 3.6), (-3.2, -3.4), (2.4, 3.7), (-6.6, 0.4)]
-
-
-class Level:
-    """Turns numbers of segments at full detail into those of this level. factor: 1 at 560,000 triangles."""
-
-    def __init__(self, factor: float) -> None:
-        self.factor = float(factor)
-
-    def __call__(self, full: float, least: int) -> int:
-        return max(round(full * self.factor), least)
 
 
 def add_furniture(builder: Builder, level: Level) -> None:

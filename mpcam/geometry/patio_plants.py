@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mpcam.geometry.levels import Level
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.patio_furniture import Level
 from mpcam.geometry.shapes import Builder, MeshPart, copies, lathe, loft, placements, smooth_curve, unit
 from mpcam.geometry.textures import painted, plaster, rgb, textured
 
