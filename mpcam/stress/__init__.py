@@ -18,11 +18,20 @@ def models() -> list[str]:
     return [name.replace("_", "-") for name in names if find_spec(f"mpcam.stress.{name}")]
 
 
+OTHERS = ("depth-images",)
+"""Suites that are not of one camera model."""
+
+
+def names() -> list[str]:
+    """All suites: those of the models, then the others."""
+    return [*models(), *OTHERS]
+
+
 def suite(model: str) -> Any:
     """The module that runs a model's cases: `run(triangles, points, progress)` and the largest error, LIMIT.
 
-    model: one of `models()`. Raises InputError for others.
+    model: one of `names()`. Raises InputError for others.
     """
-    if model not in models():
-        raise InputError(f"stress {model!r}: allowed are {', '.join(models())}, or none of them for all")
+    if model not in names():
+        raise InputError(f"stress {model!r}: allowed are {', '.join(names())}, or none of them for all")
     return import_module(f"mpcam.stress.{model.replace('-', '_')}")
