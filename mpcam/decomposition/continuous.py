@@ -59,7 +59,7 @@ def continuous(cams: CameraTriangles, direct: CameraTriangles, reflector: Reflec
     """
     start = with_shared_lengths(direct)
     slant = slants(direct)
-    regular = (slant >= GRAZING).all(axis=0) | (slant <= -GRAZING).all(axis=0)
+    regular = np.asarray((slant >= GRAZING).all(axis=0) | (slant <= -GRAZING).all(axis=0))
     unit = direct.directions / np.linalg.norm(direct.directions, axis=1, keepdims=True)
     view = seen_samples(reflector, eye, max(_SAMPLES, _PER_TRIANGLE * cams.count))
     samples = _samples(cams, unit, view, reflector.radius)

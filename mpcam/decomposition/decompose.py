@@ -123,7 +123,8 @@ def subdivided(
 ) -> CameraTriangles:
     """Each camera triangle in four, `levels` times (26, 26 x 4 and 26 x 4^2 triangles: Hou et al. 2006, Table 1).
 
-    The new vertices, in the middle of the edges, are put on the true surface by normal shooting and have its normals.
+    The new vertices, in the middle of the edges, are put on the true surface by normal shooting and have its normals,
+    of the mean length of their neighbors'. Vertices that a fit has moved stay where they are: fit again.
     resolution: pixels along the short sides of all; default: half of what it was at each level, at least 2. Raises
     InputError for camera triangles with directions, and levels that are not whole numbers from 0 to 6.
     """
@@ -146,7 +147,8 @@ def subdivided(
         bc, ca, ab = number.reshape(-1, 3).T + len(vertices)
         four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
         faces = np.stack([np.stack(part, axis=1) for part in four], axis=1).reshape(-1, 3)
-        vertices, normals = np.concatenate([vertices, shot.points]), np.concatenate([normals, shot.normals])
+        lengths = np.linalg.norm(normals[ends], axis=2).mean(axis=1, keepdims=True)
+        vertices, normals = np.concatenate([vertices, shot.points]), np.concatenate([normals, lengths * shot.normals])
         sides = np.maximum((np.repeat(sides, 4) if sides.ndim else sides) // 2, 2)
     return dataclasses.replace(
         cams,
