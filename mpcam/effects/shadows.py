@@ -1,7 +1,7 @@
 """Shadow maps: how far a light reaches in each direction, by depth-only views (Gascuel et al. 2008, section 5.3).
 
 A point light looks around with two paraboloid views, parallel light with one orthographic view that holds the whole
-mesh. A surface element at distance r from the light is lit where the map is not nearer than the element. How much
+scene. A surface element at distance r from the light is lit where the map is not nearer than the element. How much
 nearer a texel may be without harm follows from the texel, not from a constant:
 
 - With normals, the depth at which the element's own plane crosses the ray of the texel's center takes the place of r
@@ -22,10 +22,11 @@ import numpy as np
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.orthographic import Orthographic
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, pixels_per_radius, place, texel_direction
+from mpcam.effects.relief_hits import relief_hits
 from mpcam.effects.vectors import as_vectors
 from mpcam.errors import InputError
-from mpcam.geometry.mesh import Mesh
 from mpcam.math.pose import look_at
+from mpcam.rendering.maps import DepthMap
 from mpcam.rendering.methods import depth_map
 from mpcam.rendering.shade import check_shadow_shading
 from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
@@ -187,17 +188,30 @@ def _upload(vectors: np.ndarray) -> Any:
 def shadow_map(scene: Any, light: Light, size: int = 1024) -> ShadowMap:
     """The shadow map of a light: two paraboloid depth maps for a PointLight, one orthographic for a DirectionalLight.
 
-    scene: a Scene, a Mesh or several meshes. light: need not be one of the scene's. size: pixels along a side, of the
-    longer one for parallel light; 8 to 16384. Raises InputError.
+    scene: a Scene, its reliefs too, a Mesh or several meshes. light: need not be one of the scene's. size: pixels along
+    a side, of the longer one for parallel light; 8 to 16384. Raises InputError.
     """
     if not isinstance(light, Light):
         raise InputError(f"light is a {type(light).__name__}: give a PointLight or a DirectionalLight")
-    size, mesh = check_size(size), Scene.of(scene).mesh
+    size, whole = check_size(size), Scene.of(scene)
     if isinstance(light, PointLight):
         cameras: tuple[Any, ...] = back_to_back(light.position, size)
     else:
-        cameras = (_enclosing(mesh, light, size),)
-    return ShadowMap(light, cameras, tuple(depth_map(camera, mesh) for camera in cameras))
+        cameras = (_enclosing(whole, light, size),)
+    return ShadowMap(light, cameras, tuple(_depth(camera, whole) for camera in cameras))
+
+
+def _depth(camera: Any, scene: Scene) -> DepthMap:
+    """How far the first surface is, of a mesh or a relief."""
+    import drjit as dr
+
+    found = depth_map(camera, scene.mesh)
+    if not scene.reliefs:
+        return found
+    seen = relief_hits(camera, scene.reliefs, found.device_depth)
+    nearest = dr.minimum(found.device_depth, seen.device_depth)
+    dr.eval(nearest)
+    return DepthMap(camera, nearest)
 
 
 def shadow_maps(scene: Scene, size: int = 1024, shading: str = "light") -> tuple[ShadowMap, ...]:
@@ -208,10 +222,10 @@ def shadow_maps(scene: Scene, size: int = 1024, shading: str = "light") -> tuple
     return tuple(shadow_map(scene, light, check_size(size, "shadow_size")) for light in scene.lights)
 
 
-def _enclosing(mesh: Mesh, light: DirectionalLight, size: int) -> Orthographic:
-    """An orthographic camera that looks along the light and holds the whole mesh, with a margin of a few texels."""
+def _enclosing(scene: Scene, light: DirectionalLight, size: int) -> Orthographic:
+    """An orthographic camera that looks along the light and holds the whole scene, with a margin of a few texels."""
     pose = look_at((0.0, 0.0, 0.0), light.direction)
-    used = mesh.corners.reshape(-1, 3)
+    used = np.concatenate([scene.mesh.corners.reshape(-1, 3), *(one.boxes.vertices for one in scene.reliefs)])
     with np.errstate(invalid="ignore", over="ignore"):
         seen = used @ pose[:3, :3].T
     seen = seen[np.isfinite(seen).all(axis=1)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, types
+from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import MovedMesh
@@ -92,14 +92,18 @@ def vertex_normals(mesh: Mesh) -> Any:
 
 
 @exclusive
-def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequence[Any] = ()) -> np.ndarray:
+def shade(
+    hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequence[Any] = (), exposure: Any = None
+) -> np.ndarray:
     """Colors of hits: (H, W, 3) float32, linear RGB; the scene's background where nothing is hit.
 
     scene: the Scene (or Mesh) that the hits were made with; default: the hits' mesh. shading: "color" (material and
     vertex color), "texture" (the same times the texture), "normal" (world shading normal towards the viewer, 0.5 +
     0.5 n), "light" (texture, lit: Lambert's law, both sides, ambient; without lights, one at the viewer). shadows: the
-    shadow maps of the scene's lights, in their order (see `shadow_map`), for "light"; default: no shadows. Raises
-    InputError for another shading, a scene whose mesh the hits do not belong to, and shadow maps of other lights.
+    shadow maps of the scene's lights, in their order (see `shadow_map`), for "light"; default: no shadows. exposure:
+    (H, W) share of the ambient light that arrives (see `screen_occlusion`), or a Float of it on the device, for
+    "light"; default: all. Raises InputError for another shading, a scene whose mesh the hits do not belong to, shadow
+    maps of other lights, and an exposure of another size.
     """
     whole = Scene.of(hits.mesh if scene is None else scene)
     check_shading(shading)
@@ -109,7 +113,7 @@ def shade(hits: Hits, scene: Any = None, shading: str = "light", shadows: Sequen
             "give the scene that was rasterized"
         )
     check_shadows(shadows, whole, shading)
-    color = shade_device(hits, whole, shading, shadows)
+    color = shade_device(hits, whole, shading, shadows, _on_device(exposure, hits, shading))
     return np.stack([np.asarray(c.numpy()) for c in color], -1).reshape(hits.camera.height, hits.camera.width, 3)
 
 
@@ -117,6 +121,23 @@ def check_shading(shading: str) -> None:
     """See that there is such a shading."""
     if shading not in SHADINGS:
         raise InputError(f"shading={shading!r}: allowed are {', '.join(SHADINGS)}")
+
+
+def _on_device(exposure: Any, hits: Hits, shading: str) -> Any:
+    """The exposure as a Float on the device, or None."""
+    if exposure is None:
+        return None
+    if shading != "light":
+        raise InputError(f"exposure goes with shading='light', not with {shading!r}: leave one of them out")
+    t, shape = types(), (hits.camera.height, hits.camera.width)
+    if isinstance(exposure, t.Float):
+        return exposure
+    values = np.asarray(exposure)
+    if values.shape != shape or values.dtype.kind != "f":
+        raise InputError(
+            f"exposure has shape {values.shape} and type {values.dtype}: floats of shape {shape} are needed"
+        )
+    return t.Float(np.ascontiguousarray(values, np.float32).ravel()) + opaque_zero()
 
 
 def check_shadow_shading(shading: str) -> None:
@@ -138,7 +159,9 @@ def check_shadows(shadows: Sequence[Any], scene: Scene, shading: str) -> None:
 
 
 @exclusive
-def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequence[Any] = ()) -> Any:
+def shade_device(
+    hits: Hits, scene: Scene, shading: str = "light", shadows: Sequence[Any] = (), exposure: Any = None
+) -> Any:
     """As `shade`, but the colors stay on the device: an evaluated Array3f, one entry per pixel."""
     import drjit as dr
 
@@ -171,9 +194,10 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
         data |= {"direction": hits.view.ray.direction}
     kinds: tuple[str, ...] = ()
     if shading == "light":
-        kinds = tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
+        kinds = light_kinds(scene)
         data["ambient"] = opaque_numbers(list(scene.ambient))
-        data["lights"] = [_light_numbers(light, hits) for light in scene.lights]
+        data |= {"exposure": exposure} if exposure is not None else {}
+        data["lights"] = [light_numbers(light, device_mesh(hits.mesh).anchor) for light in scene.lights]
         if "point" in kinds or shadows:
             data["scale"] = opaque_numbers([device_mesh(hits.mesh).scale])[0]
         if shadows:
@@ -182,12 +206,17 @@ def shade_device(hits: Hits, scene: Scene, shading: str = "light", shadows: Sequ
     return kernel(hits.device_triangle, weights, data)
 
 
-def _light_numbers(light: Any, hits: Hits) -> list[Any]:
-    """Direction to the light, or its position from the mesh's anchor, in world axes; then its strength."""
+def light_kinds(scene: Scene) -> tuple[str, ...]:
+    """Of each light whether it is "directional" or "point"."""
+    return tuple("directional" if isinstance(light, DirectionalLight) else "point" for light in scene.lights)
+
+
+def light_numbers(light: Any, anchor: np.ndarray) -> list[Any]:
+    """Direction to the light, or its position from an anchor (3,), in world axes; then its strength."""
     if isinstance(light, DirectionalLight):
         return opaque_numbers([*(-np.asarray(light.direction)), *light.radiance])
     assert isinstance(light, PointLight)
-    return opaque_numbers([*(light.position - device_mesh(hits.mesh).anchor), *light.intensity])
+    return opaque_numbers([*(light.position - anchor), *light.intensity])
 
 
 @functools.cache
@@ -230,11 +259,11 @@ def _kernel(shading: str, lights: tuple[str, ...], smooth: bool) -> Any:
             if shading == "normal":
                 color = 0.5 + 0.5 * normal
             elif not lights:
-                color *= t.Array3f(*data["ambient"]) + dr.maximum(dr.dot(normal, back), 0)
+                color *= _ambient(t, data) + dr.maximum(dr.dot(normal, back), 0)
             else:
                 # From what is hit, not along the ray, which may be bent; from the anchor, where float32 is dense.
                 point = (a * mix[0] + b * mix[1] + c * mix[2]) * data["scale"] if "scale" in data else None
-                color *= _lit(t, data, lights, normal, point, flat)
+                color *= lit(t, data, lights, normal, point, flat)
         return dr.select(hit, color, _unhit(t, data))
 
     return kernel
@@ -289,14 +318,20 @@ def _texture(t: Any, data: dict[str, Any], material: Any, uv: Any, hit: Any) -> 
     return dr.select(some, upper * (1 - fy) + lower * fy, 1.0)
 
 
-def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, point: Any, flat: Any) -> Any:
+def _ambient(t: Any, data: dict[str, Any]) -> Any:
+    """Light from everywhere, as much of it as arrives."""
+    ambient = t.Array3f(*data["ambient"])
+    return ambient * data["exposure"] if "exposure" in data else ambient
+
+
+def lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, point: Any, flat: Any) -> Any:
     """Light that arrives, for a white surface: ambient and Lambert's law for each light that is not in shadow."""
     import drjit as dr
 
-    total, reached = t.Array3f(*data["ambient"]), [True] * len(lights)
+    total, reached = _ambient(t, data), [True] * len(lights)
     if "shadows" in data:
         reached = [shadow.visible(point, flat) for shadow in data["shadows"]]
-    for kind, numbers, lit in zip(lights, data["lights"], reached, strict=True):
+    for kind, numbers, free in zip(lights, data["lights"], reached, strict=True):
         place, strength = t.Array3f(*numbers[:3]), t.Array3f(*numbers[3:])
         if kind == "directional":
             arriving = dr.maximum(dr.dot(normal, place), 0)
@@ -304,7 +339,7 @@ def _lit(t: Any, data: dict[str, Any], lights: tuple[str, ...], normal: Any, poi
             away = place - point
             squared = dr.maximum(dr.squared_norm(away), 1e-30)
             arriving = dr.maximum(dr.dot(normal, away), 0) * dr.rsqrt(squared) / squared
-        total += strength * (arriving if lit is True else dr.select(lit, arriving, 0.0))
+        total += strength * (arriving if free is True else dr.select(free, arriving, 0.0))
     return total
 
 

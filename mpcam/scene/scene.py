@@ -61,8 +61,9 @@ class Scene:
 
     meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
     linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. environment: an
-    EnvironmentMap that rays see which miss everything, in place of the background. Raises InputError where a field has
-    the wrong kind.
+    EnvironmentMap that rays see which miss everything, in place of the background. reliefs: one ReliefInstances or
+    several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. Raises InputError
+    where a field has the wrong kind.
     """
 
     meshes: tuple[Mesh, ...]
@@ -73,6 +74,7 @@ class Scene:
     name: str = "scene"
     mirror: Mirror | None = None
     environment: Any = None
+    reliefs: tuple[Any, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
@@ -83,6 +85,14 @@ class Scene:
             raise InputError(f"scene mirror is a {type(self.mirror).__name__}: give mpcam.Mirror(surface)")
         if self.environment is not None and not hasattr(self.environment, "on_device"):
             raise InputError(f"scene environment is a {type(self.environment).__name__}: give an mpcam.EnvironmentMap")
+        reliefs = self.reliefs if isinstance(self.reliefs, (list, tuple)) else (self.reliefs,)
+        for one in reliefs:
+            if not hasattr(one, "placements"):
+                raise InputError(
+                    f"scene reliefs: a {type(one).__name__} is none: give mpcam.ReliefInstances, such as "
+                    "relief.instances(placements)"
+                )
+        object.__setattr__(self, "reliefs", tuple(reliefs))
 
     @cached_property
     def mesh(self) -> Mesh:
