@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from mpcam.cameras import Projection as Projection
     from mpcam.cameras import Ray as Ray
     from mpcam.cameras import custom_profile as custom_profile
+    from mpcam.cameras.graph_portals import Portal as Portal
+    from mpcam.cameras.maze_plan import MazePlan as MazePlan
     from mpcam.cameras.registry import *  # noqa: F403
     from mpcam.comparison.driver import compare as compare
     from mpcam.comparison.table import Comparison as Comparison
@@ -24,20 +26,37 @@ if TYPE_CHECKING:
     from mpcam.decomposition.ray_error import ray_error as ray_error
     from mpcam.decomposition.resolve import Resolver as Resolver
     from mpcam.decomposition.resolve import resolve as resolve
+    from mpcam.depth_images.depth_image import DepthImage as DepthImage
+    from mpcam.depth_images.intersections import Intersections as Intersections
+    from mpcam.depth_images.layered import LayeredDepthImage as LayeredDepthImage
+    from mpcam.depth_images.several import intersect as intersect
     from mpcam.effects.caustics import Caustics as Caustics
     from mpcam.effects.caustics import caustics as caustics
+    from mpcam.effects.choose_camera import ChosenCamera as ChosenCamera
+    from mpcam.effects.choose_camera import choose_occlusion_camera as choose_occlusion_camera
     from mpcam.effects.environment import EnvironmentMap as EnvironmentMap
+    from mpcam.effects.horizon_occlusion import screen_occlusion as screen_occlusion
     from mpcam.effects.occlusion import ambient_occlusion as ambient_occlusion
     from mpcam.effects.occlusion import form_factor as form_factor
     from mpcam.effects.reflection import Reflection as Reflection
     from mpcam.effects.reflection import reflection as reflection
+    from mpcam.effects.relief import Relief as Relief
+    from mpcam.effects.relief_hits import ReliefHits as ReliefHits
+    from mpcam.effects.relief_hits import relief_hits as relief_hits
+    from mpcam.effects.relief_instances import ReliefInstances as ReliefInstances
+    from mpcam.effects.relief_picture import ReliefPicture as ReliefPicture
     from mpcam.effects.shadows import ShadowMap as ShadowMap
     from mpcam.effects.shadows import shadow_map as shadow_map
+    from mpcam.effects.traced_occlusion import traced_occlusion as traced_occlusion
     from mpcam.effects.visualization import Unrolled as Unrolled
     from mpcam.effects.visualization import surround as surround
     from mpcam.effects.visualization import unrolled as unrolled
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
+    from mpcam.fitting.fit import fit as fit
+    from mpcam.fitting.general_linear import GeneralLinearFit as GeneralLinearFit
+    from mpcam.fitting.general_linear import fit_general_linear as fit_general_linear
+    from mpcam.fitting.result import Fit as Fit
     from mpcam.geometry.builtin import builtin_mesh as builtin_mesh
     from mpcam.geometry.load import load_mesh as load_mesh
     from mpcam.geometry.mesh import Material as Material
@@ -45,6 +64,8 @@ if TYPE_CHECKING:
     from mpcam.geometry.surfaces import Surface as Surface
     from mpcam.io.calibration import read_calibration as read_calibration
     from mpcam.io.calibration import write_calibration as write_calibration
+    from mpcam.io.fits import read_fit as read_fit
+    from mpcam.io.fits import write_fit as write_fit
     from mpcam.io.images import read_camera as read_camera
     from mpcam.io.images import read_channels as read_channels
     from mpcam.io.images import read_image as read_image
@@ -76,6 +97,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "mpcam.cameras": "Box Camera Domain Profile Projection Ray custom_profile",
+    "mpcam.cameras.maze_plan": "MazePlan",
+    "mpcam.cameras.graph_portals": "Portal",
     "mpcam.comparison.driver": "compare",
     "mpcam.comparison.table": "Comparison",
     "mpcam.decomposition.chained": "Chained",
@@ -83,18 +106,33 @@ _HOMES = {
     "mpcam.decomposition.decompose": "decompose subdivided",
     "mpcam.decomposition.ray_error": "RayError ray_error",
     "mpcam.decomposition.resolve": "Resolver resolve",
+    "mpcam.depth_images.depth_image": "DepthImage",
+    "mpcam.depth_images.intersections": "Intersections",
+    "mpcam.depth_images.layered": "LayeredDepthImage",
+    "mpcam.depth_images.several": "intersect",
     "mpcam.effects.caustics": "Caustics caustics",
+    "mpcam.effects.choose_camera": "ChosenCamera choose_occlusion_camera",
     "mpcam.effects.environment": "EnvironmentMap",
+    "mpcam.effects.horizon_occlusion": "screen_occlusion",
     "mpcam.effects.occlusion": "ambient_occlusion form_factor",
     "mpcam.effects.reflection": "Reflection reflection",
+    "mpcam.effects.relief": "Relief",
+    "mpcam.effects.relief_hits": "ReliefHits relief_hits",
+    "mpcam.effects.relief_instances": "ReliefInstances",
+    "mpcam.effects.relief_picture": "ReliefPicture",
     "mpcam.effects.shadows": "ShadowMap shadow_map",
+    "mpcam.effects.traced_occlusion": "traced_occlusion",
     "mpcam.effects.visualization": "Unrolled surround unrolled",
     "mpcam.errors": "InputError SetupError",
+    "mpcam.fitting.fit": "fit",
+    "mpcam.fitting.general_linear": "GeneralLinearFit fit_general_linear",
+    "mpcam.fitting.result": "Fit",
     "mpcam.geometry.builtin": "builtin_mesh",
     "mpcam.geometry.load": "load_mesh",
     "mpcam.geometry.mesh": "Material Mesh",
     "mpcam.geometry.surfaces": "Surface",
     "mpcam.io.calibration": "read_calibration write_calibration",
+    "mpcam.io.fits": "read_fit write_fit",
     "mpcam.io.images": "read_camera read_channels read_image read_ray_map write_image write_ray_map",
     "mpcam.io.scenes": "load_scene",
     "mpcam.math.pose": "look_at",

@@ -7,18 +7,15 @@ import sys
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
 import mpcam
 from mpcam.cli_common import View, check_machine, image_size, load, print_json, say_warnings
-from mpcam.cli_mirrors import caustics, decompose, surround
+from mpcam.cli_mirrors import InMirror, caustics, decompose, surround
 from mpcam.errors import InputError, SetupError
 from mpcam_kernels.backend import BackendError
-
-if TYPE_CHECKING:
-    pass
 
 EXIT_FAILURE, EXIT_INPUT, EXIT_INTERRUPT = 1, 2, 130
 
@@ -141,45 +138,45 @@ def render(
     shading: str = "light",
     shadows: bool = False,
     shadow_size: int | None = None,
+    occlusion: float | None = None,
     level: int | None = None,
     patch: int | None = None,
     resolution: int | None = None,
     bound: str | None = None,
     cull: str | None = None,
-    triangles: int | None = None,
+    mirror: InMirror | None = None,
     explain: bool = False,
 ) -> None:
     """Render a scene or mesh to an image file; an EXR also keeps the depth and the camera.
 
     Where the scene has a mirror, the rest is seen in it: by camera triangles (--method invert), by its vertices with
-    straight edges between (vertex), by an environment map (environment) or by rays of the true surface (raytrace).
+    straight edges between (vertex), by an environment map (environment), by depth images that rays are met with
+    (depth_image) or by rays of the true surface (raytrace).
 
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
-        method: invert, vertex, two_pass, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment or
-            raytrace.
+        method: invert, vertex, two_pass, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment,
+            depth_image or raytrace.
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.
         shadows: Let the scene's lights cast shadows, by a shadow map each.
         shadow_size: Pixels along a side of those; 1024 if not given.
+        occlusion: Radius, scene units, within which surfaces keep ambient light from each other; pinholes only.
         level: Times that --method vertex halves each edge.
         patch: Samples along a side of each triangle, for --method two_pass.
         resolution: Pixels along a face of --method cubemap and hemicube, or along the short sides of camera triangles.
         bound: tight, triangle or quad, for --method invert.
         cull: none, back or front: the side of triangles that --method invert does not show.
-        triangles: Camera triangles that stand for the scene's mirror; its own number if not given.
         explain: Print which stages run, which are left out, and why.
     """
     from rich.console import Console
 
     from mpcam.cameras.change import projected
-    from mpcam.effects.shadows import shadow_maps
     from mpcam.io.image_formats import format_of
     from mpcam.io.images import write_image
-    from mpcam.rendering.methods import rasterize
-    from mpcam.rendering.shade import shade
+    from mpcam.pictures.render import image_and_depth
 
     layers = format_of(output).layers
     if projection is not None and view is not None and view.camera is not None:
@@ -189,37 +186,19 @@ def render(
     check_machine()
     loaded = load(scene, size, view).scene
     camera = projected(loaded.camera, projection) if projection else loaded.camera
-    asked = {
-        "level": level,
-        "patch": patch,
-        "resolution": resolution,
-        "bound": bound,
-        "cull": cull,
-        "triangles": triangles,
-    }
+    asked = {"level": level, "patch": patch, "resolution": resolution, "bound": bound, "cull": cull}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
-    if loaded.mirror is not None:
-        from mpcam.pictures.render import render as picture
-
-        with Console(stderr=True).status(f"rendering {loaded.name}"):
-            texels = 1024 if shadow_size is None else shadow_size
-            options: dict[str, Any] = {"shading": shading, "shadows": shadows, "shadow_size": texels}
-            image = picture(camera, loaded, method, explain=explain, **options, **settings)
-            if layers:
-                write_image(output, image, camera=camera)
-            else:
-                write_image(output, image)
-        return
-    if explain:
+    settings |= (mirror or InMirror()).settings()
+    if explain and loaded.mirror is None:
         from mpcam.pictures.explain import explain as explained
 
         print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))
+        explain = False
+    options: dict[str, Any] = {"shading": shading, "shadows": shadows, "occlusion": occlusion, "explain": explain}
+    options["shadow_size"] = 1024 if shadow_size is None else shadow_size
     with Console(stderr=True).status(f"rendering {loaded.name}"):
-        texels = 1024 if shadow_size is None else shadow_size
-        maps = shadow_maps(loaded, texels, shading) if shadows else ()
-        hits = rasterize(camera, loaded.mesh, method=method, **settings)
-        image = shade(hits, loaded, shading, maps)
-        write_image(output, image, **({"depth": hits.depth, "camera": camera} if layers else {}))
+        image, depth = image_and_depth(camera, loaded, method, layers, **options, **settings)
+        write_image(output, image, depth=depth, camera=camera if layers else None)
 
 
 for command in (decompose, caustics, surround):
@@ -288,7 +267,7 @@ def stress(
     """Run camera models on their stiff and extreme cases, against 50 digits and dense sampling; all without a name.
 
     Args:
-        model: A camera model, such as kannala-brandt.
+        model: A camera model, such as kannala-brandt; or depth-images.
         triangles: Random triangles whose bounds are checked, per camera; for camera triangles, pairs per kind of rays.
         points: Points and pixels per camera and kind.
         json: Print every row of every camera as JSON.
@@ -296,10 +275,10 @@ def stress(
     from rich.console import Console
 
     from mpcam.comparison.progress import bar
-    from mpcam.stress import models, report, suite
+    from mpcam.stress import names, report, suite
 
     given = {name: value for name, value in (("triangles", triangles), ("points", points)) if value is not None}
-    suites = {name: suite(name) for name in ([model] if model else models())}
+    suites = {name: suite(name) for name in ([model] if model else names())}
     report.check_counts(**given)
     check_machine()
     console, found, good = Console(width=None if sys.stdout.isatty() else 130), [], True

@@ -1,5 +1,6 @@
-"""The commands around camera triangles: decompose, caustics, surround."""
+"""What mirrors need of the command line: options of `render`, and the commands decompose, caustics, surround."""
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,6 +8,33 @@ from cyclopts import Parameter
 
 from mpcam.cli_common import check_machine, load, print_json
 from mpcam.errors import InputError
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class InMirror:
+    """How the scene's mirror is shown.
+
+    Args:
+        triangles: Camera triangles that stand for it; the scene's own number if not given.
+        image_size: Pixels along a side of environment maps or depth images, for --method environment and depth_image.
+        aside: How far around things depth images reach, in radii of the thing; 0 for pinholes.
+        bounces: How often rays are reflected, for --method depth_image and raytrace.
+        reflectance: Part of the light that the scene's meshes reflect, with more than one bounce.
+        own: Show the mirror in itself, with more than one bounce.
+    """
+
+    triangles: int | None = None
+    image_size: int | None = None
+    aside: float | None = None
+    bounces: int | None = None
+    reflectance: float | None = None
+    own: bool | None = None
+
+    def settings(self) -> dict[str, Any]:
+        """What was given, by the names of `mpcam.Reflection`."""
+        given = {"size" if name == "image_size" else name: value for name, value in asdict(self).items()}
+        return {name: value for name, value in given.items() if value is not None}
 
 
 def decompose(
@@ -32,8 +60,6 @@ def decompose(
             mirror if not given.
         json: Print the errors as JSON.
     """
-    from dataclasses import asdict
-
     from mpcam.cameras.serialize import camera_to_json
     from mpcam.decomposition.decompose import decompose as cut
     from mpcam.decomposition.ray_error import ray_error

@@ -58,7 +58,7 @@ def test_code_runs_and_prints_what_the_page_says(page, tmp_path):
     """The blocks of a page are one program; a text block after one holds what it prints, with ... for anything."""
     text = page.read_text(encoding="utf-8")
     blocks = BLOCK.findall(text)
-    for toml in re.findall(r"^```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
+    for toml in re.findall(r"^```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[:1]:  # others are parts of files
         (tmp_path / "still_life.toml").write_text(toml, encoding="utf-8")
     printed = run(f"\nprint({MARK!r})\n".join(source for source, _ in blocks), tmp_path).split(f"{MARK}\n")
     assert len(printed) == len(blocks)
@@ -247,10 +247,13 @@ SECTIONS = (
     ('`model = "orthographic"`', camera_table(mpcam.Orthographic), CameraTable),
     ('`model = "general_linear"`', camera_table(mpcam.GeneralLinear), CameraTable),
     ('`model = "general_linears"`', camera_table(mpcam.GeneralLinears), CameraTable),
+    ('`model = "single_pole_occlusion"`', camera_table(mpcam.SinglePoleOcclusion), CameraTable),
+    ('`model = "graph_camera"`', camera_table(mpcam.GraphCamera), CameraTable),
     ("### A camera from a file", CameraFile, None),
     ('`type = "directional"`', tables.DirectionalTable, None),
     ('`type = "point"`', tables.PointTable, None),
     ("## `[mirror]`", tables.MirrorTable, None),
+    ("### `[mirror.depth_images]`", tables.DepthImagesTable, None),
     ("## `[environment]`", tables.EnvironmentTable, None),
     ("## `[compare]`", tables.CompareTable, None),
 )

@@ -151,7 +151,8 @@ def test_moved_vertices_give_the_moved_picture(method):
     before = picture.image()
     moved = shown.mesh.vertices + [0.2, 0.1, 0.1]
     picture.update(moved)
-    other = dataclasses.replace(shown, meshes=(dataclasses.replace(shown.mesh, vertices=moved),))
+    meshes = [dataclasses.replace(mesh, vertices=mesh.vertices + [0.2, 0.1, 0.1]) for mesh in shown.meshes]
+    other = dataclasses.replace(shown, meshes=tuple(meshes))
     after = picture.image()
     assert different(before, after) > 0.02
     assert different(after, Reflection(other, method=method).image()) < 0.003
@@ -172,21 +173,22 @@ def test_render_explains_and_compare_measures(tmp_path):
     assert "camera triangles" in found.ran and "environment map" in found.left_out
     table = mp.compare(
         shown,
-        settings={"camera_triangles": [26, 104], "vertex": [2], "environment": [64]},
+        settings={"camera_triangles": [26, 104], "vertex": [2], "environment": [64], "depth_image": [64]},
         repeats=1,
         output=tmp_path / "out",
     )
-    labels = ["camera_triangles 26", "camera_triangles 104", "vertex level 2", "environment 64", "raytrace"]
+    labels = ["camera_triangles 26", "camera_triangles 104", "vertex level 2", "environment 64", "depth_image 64"]
+    labels.append("raytrace")
     assert [row.label for row in table] == labels
     flip, ray = table.column("flip"), table.column("ray_angle")
-    assert flip[1] < flip[0] < flip[3] and flip[4] == 0 < flip[2] and ray[1] < ray[0]
+    assert flip[1] < flip[0] < flip[3] and flip[5] == 0 < flip[2] and ray[1] < ray[0] and 0 < flip[4] < flip[3]
     assert (tmp_path / "out" / "report.html").exists() and "mrad" in str(table)
 
 
 def test_mistakes_are_told():
     shown = scene(WAVE)
     for arguments, words in (
-        ({"method": "magic"}, "camera_triangles, vertex, environment, raytrace"),
+        ({"method": "magic"}, "camera_triangles, vertex, environment, depth_image, raytrace"),
         ({"method": "raytrace", "triangles": 10}, "goes with method='camera_triangles' or 'vertex', not with 'raytr"),
         ({"level": 1}, "level= goes with method='vertex'"),
         ({"method": "vertex", "level": 9}, "from 0 to 7"),

@@ -65,6 +65,11 @@ def compare(
         raise InputError(f"Scene {scene.name!r} has no camera; give it one, or pass camera= to compare.")
     if repeats < 1:
         raise InputError(f"repeats={repeats}: at least 1 timed round is needed.")
+    if scene.reliefs:
+        raise InputError(
+            f"Scene {scene.name!r} has reliefs, which every method shows in the same way: leave them out of a "
+            "comparison of methods, or give them as meshes"
+        )
     if output is not None:
         check_output(output)
     mesh = scene.mesh

@@ -1,4 +1,4 @@
-"""`mpcam.compare` for scenes with a mirror: camera triangles, vertices, environment maps, traced rays."""
+"""`mpcam.compare` for scenes with a mirror: camera triangles, vertices, environment maps, depth images, rays."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace

@@ -31,6 +31,7 @@ STAGES = {
     "straight edges": "",
     "atlas to picture": "",
     "environment map": "",
+    "depth images": "",
     "rays of the true surface": "",
 }
 """What any part may do, in order, and why a part does without it where this is not the method itself."""

@@ -5,8 +5,8 @@ rays traced from the true surface.
 """
 
 import functools
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
+from mpcam.effects.by_depth_image import ByDepthImages
+from mpcam.effects.depth_image_choice import DepthImageChoice, choice_of
 from mpcam.effects.lookup import check_size
-from mpcam.effects.mirror_methods import MIRROR_METHODS
+from mpcam.effects.mirror_methods import MIRROR_METHODS, MirrorSettings
 from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, MirrorPart, explained
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
+from mpcam.effects.traced_orders import ByTracedOrders
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import moved
@@ -35,10 +38,14 @@ class Reflection:
     scene: its meshes are seen in the mirror and beside it. mirror: default the scene's. camera: with a common center;
     default the scene's. method: "camera_triangles"; "vertex", the images of the scene's vertices in camera triangles,
     joined by straight edges, each split 2**level times first; "environment", an environment map from the mirror's
-    middle, two views of `size` (512) pixels; "raytrace", rays from the true surface (Mitsuba), the truth. shading: as
-    for `render`; rays that miss the scene see its environment, or its background. triangles, and for
-    "camera_triangles" resolution: in place of the mirror's. cams: camera triangles to take instead of decomposing the
-    mirror. shadows: shadow maps of the scene's lights (see `shadow_map`), in which the mirror itself throws none.
+    middle, two views of `size` (512) pixels; "depth_image", depth images that the true surface's rays are met with;
+    "raytrace", rays from the true surface (Mitsuba), the truth. shading: as for `render`; rays that miss the scene see
+    its environment, or its background. shadows: shadow maps of the scene's lights (see `shadow_map`), in which the
+    mirror itself throws none.
+
+    settings: of the method, see `TriangleSettings`, `MirrorVertexSettings`, `EnvironmentSettings`,
+    `DepthImageSettings`, and `OrderSettings`, which "raytrace" has too.
+
     Raises InputError for a scene without mirror or camera, an eye that does not see it, and other values.
     """
 
@@ -51,12 +58,8 @@ class Reflection:
         *,
         method: str = "camera_triangles",
         shading: str = "light",
-        triangles: int | None = None,
-        resolution: int | None = None,
-        size: int | None = None,
-        level: int | None = None,
-        cams: CameraTriangles | None = None,
         shadows: Sequence[Any] = (),
+        **settings: Unpack[MirrorSettings],
     ):
         self.scene, self.method, self.shading, self.shadows = scene, method, shading, shadows
         given = camera if camera is not None else scene.camera
@@ -72,42 +75,57 @@ class Reflection:
         self.camera, self.mirror = given, found
         if method not in MIRROR_METHODS:
             raise InputError(f"method={method!r}: allowed are {', '.join(MIRROR_METHODS)}")
-        names = {one: entry.home(given).names for one, entry in MIRROR_METHODS.items()}
-        given_settings = {"triangles": triangles, "resolution": resolution, "cams": cams, "size": size, "level": level}
-        for name, value in given_settings.items():
-            if value is not None and name not in names[method]:
-                fitting = " or ".join(repr(one) for one in names if name in names[one])
-                raise InputError(f"{name}= goes with method={fitting}, not with {method!r}")
+        self._settings = self._checked(dict(settings))
         self.direct: Any = prepare(given, scene.mesh)
-        self.part = self._part(triangles, resolution, size, level, cams)
+        self.part = self._part()
         self._color = opaque_numbers(list(found.color))
 
-    def _part(
-        self,
-        triangles: int | None,
-        resolution: int | None,
-        size: int | None,
-        level: int | None,
-        cams: CameraTriangles | None,
-    ) -> MirrorPart:
+    def _checked(self, settings: dict[str, Any]) -> dict[str, Any]:
+        """Those that are not None; raises InputError for those that do not go with the method."""
+        names = {one: entry.home(self.camera).names for one, entry in MIRROR_METHODS.items()}
+        kept = {name: value for name, value in settings.items() if value is not None or name == "coarse"}
+        for name in kept:
+            if name not in names[self.method]:
+                fitting = " or ".join(repr(one) for one in names if name in names[one])
+                if not fitting:
+                    allowed = ", ".join(names[self.method]) or "none"
+                    raise InputError(f"method={self.method!r} has no setting {name!r}: allowed are {allowed}")
+                raise InputError(f"{name}= goes with method={fitting}, not with {self.method!r}")
+        return kept
+
+    def _part(self) -> MirrorPart:
         """What the method shows in the mirror."""
-        camera, mesh, mirror = self.camera, self.scene.mesh, self.mirror
+        camera, mesh, mirror, given = self.camera, self.scene.mesh, self.mirror, self._settings
 
         def decomposed(side: int, mode: str = "normals") -> CameraTriangles:
-            many = mirror.triangles if triangles is None else triangles
+            many = given.get("triangles", mirror.triangles)
             return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index, mode=mode)
 
+        cams = given.get("cams")
         if self.method == "camera_triangles":
-            side = mirror.resolution if resolution is None else resolution
-            found = decomposed(side, mirror.mode) if cams is None else cams
+            found = decomposed(given.get("resolution", mirror.resolution), mirror.mode) if cams is None else cams
             return ByTriangles(camera, mesh, mirror.surface, found, self.shaded)
         if self.method == "vertex":
             found = decomposed(2) if cams is None else cams
-            return ByVertices(camera, mesh, found, self.rays.ray, 0 if level is None else level, self.shaded)
+            return ByVertices(camera, mesh, found, self.rays.ray, given.get("level", 0), self.shaded)
         if self.method == "environment":
-            size = check_size(512 if size is None else size)
+            size = check_size(given.get("size", 512))
             return ByEnvironment(mesh, mirror.surface, self.rays.ray, size, self.shaded)
+        if self.method == "depth_image":
+            choice = self._choice()
+            shadows: Callable[[], Sequence[Any]] = lambda: self.shadows  # noqa: E731
+            rays = camera.eye, self.rays.ray, camera.width
+            return ByDepthImages(self.scene, mirror, *rays, self.shading, shadows, choice)
+        choice = self._choice()
+        if choice.bounces > 1:
+            return ByTracedOrders(self.scene, mirror, self.rays.ray, self.shaded, choice)
         return ByTracing(camera, mesh, self.rays.ray, self.shaded)
+
+    def _choice(self) -> DepthImageChoice:
+        """Depth images and orders of reflection: the mirror's, and what was given instead."""
+        mirror = self.mirror
+        own = {"bounces": mirror.bounces, "reflectance": mirror.reflectance, "own": mirror.own}
+        return choice_of(self.scene, **(own | dict(mirror.depth_images or {}) | self._settings))
 
     @exclusive
     def update(
@@ -144,8 +162,10 @@ class Reflection:
         beside = self.shaded(hits)
         return _over(hits.device_depth, beside, self.distance, self.part.colors(), self._color)
 
-    def shaded(self, hits: Hits) -> Any:
-        """Colors of hits on the scene, on the device."""
+    def shaded(self, hits: Hits, shading: str | None = None) -> Any:
+        """Colors of hits on the scene, on the device; shading: another than the picture's."""
+        if shading not in (None, self.shading):
+            return shade_device(hits, self.scene, shading)
         return shade_device(hits, self.scene, self.shading, self.shadows)
 
     @exclusive

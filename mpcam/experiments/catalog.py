@@ -81,6 +81,11 @@ EXPERIMENTS = {
             "Yu et al. 2009, Fig. 10: mirrors by numbers of cameras and scene triangles; the cost of one more camera",
         ),
         Experiment(
+            "rosen2011-relief",
+            "rosen2011_relief",
+            "Rosen et al. 2011, Figs. 2, 12, 13 and 20: cars and barrels as relief textures, against their triangles",
+        ),
+        Experiment(
             "leaving-out",
             "leaving_out",
             "What each part of the rasterizer is worth: frames without it, and the inner loop against its limit",
@@ -89,6 +94,11 @@ EXPERIMENTS = {
             "moving-scene",
             "moving_scene",
             "Rasterizing against rebuilding a tree and tracing, for moving and still scenes",
+        ),
+        Experiment(
+            "rosen2011-fig1",
+            "rosen2011_fig1",
+            "Rosen et al. 2011, Figs. 1, 11, 15: what depth images lack in a mirror, by camera; errors and times",
         ),
     )
 }

@@ -1,7 +1,7 @@
 """Yu et al. 2009, Fig. 8: a mirror sphere of 960 general linear cameras among butterflies, beside other rays."""
 
 import warnings
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def pictures(scene: Scene, number: int, side: int, quick: bool, steps: StepCount
         add(row, Reflection(scene, cams=cams, shadows=maps), jumps)
         steps.done(mode)
     first = found[1]
-    picture = Reflection(scene, cams=first.picture.cams, shadows=maps)
+    picture = Reflection(scene, cams=cast(CameraTriangles, first.picture.cams), shadows=maps)
     part: Any = picture.part
     part.prepared = prepare(part.cams, scene.mesh, "two_pass", patch=paper.FIG_8_PATCH)
     kept = {name: value for name, value in first.row.items() if not name.startswith(("ray_", "seam_", "angle"))}

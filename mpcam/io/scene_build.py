@@ -12,6 +12,7 @@ from mpcam.io.images import read_image
 from mpcam.io.scene_camera import build_camera, default_camera
 from mpcam.io.scene_mirror import build_mirror
 from mpcam.io.scene_place import color, placement
+from mpcam.io.scene_relief import build_relief, source_mesh
 from mpcam.io.scene_tables import DirectionalTable, EnvironmentTable, MeshTable, PointTable, SceneTable
 from mpcam.io.scene_text import SceneText
 from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
@@ -23,7 +24,8 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
     Raises InputError, with the line of the key, for what the tables' types do not rule out.
     """
     meshes = tuple(_mesh(entry, index, folder, text) for index, entry in enumerate(table.mesh))
-    bounds = bounds_of(meshes)
+    reliefs = tuple(build_relief(entry, index, folder, text) for index, entry in enumerate(table.relief))
+    bounds = bounds_of((*meshes, *(one.boxes for one in reliefs)))
     if table.camera is None:
         with text.at("mesh"):
             camera = default_camera(bounds)
@@ -43,6 +45,7 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         name=table.name or name,
         mirror=None if table.mirror is None else build_mirror(table.mirror, folder, text),
         environment=None if table.environment is None else _environment(table.environment, folder, text),
+        reliefs=reliefs,
     )
 
 
@@ -70,17 +73,7 @@ def default_light(camera: Any) -> DirectionalLight:
 
 def _mesh(table: MeshTable, index: int, folder: Path, text: SceneText) -> Mesh:
     where = ("mesh", index)
-    if (table.file is None) == (table.builtin is None):
-        raise text.error(where, "give either file (a mesh file) or builtin (the name of a built-in mesh)")
-    if table.file is not None:
-        if table.triangles is not None:
-            raise text.error((*where, "triangles"), "only built-in meshes can be made with a number of triangles")
-        from mpcam.geometry.load import load_mesh
-
-        with text.at(*where, "file"):
-            mesh = load_mesh(folder / table.file)
-    else:
-        mesh = _builtin(table, where, text)
+    mesh = source_mesh(table, where, folder, text)
     with text.at(*where):
         mesh = mesh.transformed(placement(table.scale, table.rotate, table.translate, where, text))
     if table.color is None and table.texture is None:
@@ -88,15 +81,6 @@ def _mesh(table: MeshTable, index: int, folder: Path, text: SceneText) -> Mesh:
     texture = None if table.texture is None else _texture(folder / table.texture, mesh, text, (*where, "texture"))
     tint = (1.0, 1.0, 1.0) if table.color is None else color(table.color, text, *where, "color")
     return replace(mesh, materials=(Material(tint, texture),), face_material=None)
-
-
-def _builtin(table: MeshTable, where: tuple[str, int], text: SceneText) -> Mesh:
-    from mpcam.geometry.builtin import builtin_mesh
-
-    if table.builtin not in builtin_mesh.names:
-        raise text.error((*where, "builtin"), f"allowed are {', '.join(builtin_mesh.names)}")
-    with text.at(*where, "triangles" if table.triangles else "builtin"):
-        return builtin_mesh(table.builtin, triangles=table.triangles)
 
 
 def _texture(path: Path, mesh: Mesh, text: SceneText, where: tuple[str | int, ...]) -> np.ndarray:

@@ -47,8 +47,13 @@ def build_camera(table: CameraTable | CameraFile, bounds: np.ndarray, folder: Pa
     with text.at("camera"):
         if model.ray_geometry == "parallel" and "scale" not in given:  # no place makes their view wider
             given["scale"] = _fitting_scale(bounds, table.size)
+        placed = any(key in given for key in getattr(model, "placed_by", ()))
+        view = getattr(model, "view_of_table", None)  # of models that are described in the world around them
+        if view is not None and not placed:
+            pose = _pose(table, bounds, view(*table.size, **given), text)
+            return from_table(model, *table.size, {**given, "camera_from_world": pose})
         camera = from_table(model, *table.size, given)
-        if any(key in given for key in getattr(model, "placed_by", ())):
+        if placed:
             return _placed(table, camera, text)
         return camera.with_pose(_pose(table, bounds, camera, text))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mpcam.geometry.surfaces import Surface
+from mpcam.io.camera_files import read_camera_file
 from mpcam.io.scene_place import color, placement
 from mpcam.io.scene_tables import MirrorTable
 from mpcam.io.scene_text import SceneText
@@ -23,7 +24,21 @@ def build_mirror(table: MirrorTable, folder: Path, text: SceneText) -> Mirror:
     surface = _surface(table, place, text) if kinds == ["surface"] else _mesh(table, place, folder, text)
     with text.at("mirror"):
         tint = color(table.color, text, "mirror", "color")
-        return Mirror(surface, table.index, tint, table.triangles, table.resolution, table.mode)
+        triangles = (table.triangles, table.resolution, table.mode)
+        orders = (table.bounces, table.reflectance, table.own)
+        return Mirror(surface, table.index, tint, *triangles, _depth_images(table, folder, text), *orders)
+
+
+def _depth_images(table: MirrorTable, folder: Path, text: SceneText) -> dict[str, Any] | None:
+    """Settings of method "depth_image"."""
+    given = table.depth_images
+    if given is None:
+        return None
+    found: dict[str, Any] = {name: getattr(given, name) for name in ("size", "aside", "coarse", "fine")}
+    if given.cameras is not None:
+        with text.at("mirror", "depth_images", "cameras"):
+            found["images"] = [read_camera_file(folder / name, None, None)[0] for name in given.cameras]
+    return found
 
 
 def _surface(table: MirrorTable, place: Any, text: SceneText) -> Surface:

@@ -38,6 +38,19 @@ class MeshTable(Table, frozen=True):
     texture: str | None = None  # an image file; replaces the materials too, and is multiplied by color
 
 
+Share = Annotated[float, Meta(ge=0, le=1)]
+
+
+class DepthImagesTable(Table, frozen=True):
+    """[mirror.depth_images]: what method depth_image meets the mirror's rays with; chosen for each mesh, or cameras."""
+
+    size: Annotated[int, Meta(ge=8, le=8192)] = 512  # pixels along a side
+    aside: Annotated[float, Meta(ge=0)] = 1.0  # how far around things they reach, in radii; 0: pinholes
+    coarse: Annotated[float, Meta(ge=1, le=64)] = 6.0  # pixels of a step through what is empty
+    fine: Annotated[float, Meta(ge=0.0625, le=4)] = 0.25  # pixels of a step along the surface
+    cameras: Annotated[list[str], Meta(min_length=1)] | None = None  # camera files, which see the whole scene
+
+
 class MirrorTable(Table, frozen=True):
     """[mirror]: a curved mirror, or with index an interface; one of surface (exact), file or builtin (a mesh).
 
@@ -64,6 +77,43 @@ class MirrorTable(Table, frozen=True):
     triangles: Annotated[int, Meta(ge=1, le=100000)] = 104  # camera triangles
     resolution: Annotated[int, Meta(ge=2, le=8192)] = 64  # pixels along the short sides of each
     mode: Literal["normals", "directions", "general_linear", "continuous"] = "normals"  # how rays run within each
+    depth_images: DepthImagesTable | None = None
+    bounces: Annotated[int, Meta(ge=1, le=8)] = 1  # how often rays are reflected, where a method can
+    reflectance: Share | list[Share] = 0.0  # part of the light that the meshes reflect, with more than one bounce
+    own: bool = False  # whether the mirror is seen in itself, with more than one bounce
+
+
+class GridTable(Table, frozen=True):
+    """Copies in rows along x and columns along y, around the origin."""
+
+    rows: Annotated[int, Meta(ge=1, le=1000)]
+    columns: Annotated[int, Meta(ge=1, le=1000)]
+    spacing: tuple[float, float]
+
+
+class PlaceTable(Table, frozen=True):
+    """[[relief.place]]: one copy; scaled, then rotated, then moved."""
+
+    scale: Scale = 1.0
+    rotate: RotateTable | None = None
+    translate: Vector = (0.0, 0.0, 0.0)
+    color: Color | None = None  # takes the place of the key color
+
+
+class ReliefTable(Table, frozen=True):
+    """[[relief]]: a mesh kept as a depth image, in many copies: [[relief.place]], grid or placements."""
+
+    file: str | None = None
+    builtin: str | None = None
+    triangles: Annotated[int, Meta(ge=1)] | None = None
+    camera: Literal["single_pole", "orthographic"] = "single_pole"
+    size: Annotated[int, Meta(ge=8, le=8192)] = 512
+    layers: Annotated[int, Meta(ge=1, le=8)] = 1  # orthographic only
+    key: str | Vector | None = None  # name or linear RGB of the materials that copies may color anew
+    colors: list[Vector] | None = None  # of the copies in turn, for those of a grid or of placements
+    grid: GridTable | None = None
+    placements: str | None = None  # a .npy file, (N, 4, 4)
+    place: list[PlaceTable] = []
 
 
 class EnvironmentTable(Table, frozen=True):
@@ -107,14 +157,24 @@ class PatchesTable(Table, frozen=True):
     patches: Annotated[list[Annotated[int, Meta(ge=2, le=256)]], Meta(min_length=1)]
 
 
-Method = Literal["invert", "vertex", "two_pass", "cubemap", "hemicube", "raytrace", "camera_triangles", "environment"]
+Method = Literal[
+    "invert",
+    "vertex",
+    "two_pass",
+    "cubemap",
+    "hemicube",
+    "raytrace",
+    "camera_triangles",
+    "environment",
+    "depth_image",
+]
 
 
 class CompareTable(Table, frozen=True):
     """[compare]: what `mpcam compare` runs; a key that is left out is chosen there.
 
-    Scenes with a mirror are compared by camera_triangles, vertex, environment and raytrace, others by invert,
-    vertex, two_pass, cubemap, hemicube and raytrace.
+    Scenes with a mirror are compared by camera_triangles, vertex, environment, depth_image and raytrace, others by
+    invert, vertex, two_pass, cubemap, hemicube and raytrace.
     """
 
     methods: Annotated[list[Method], Meta(min_length=1)] | None = None
@@ -124,6 +184,7 @@ class CompareTable(Table, frozen=True):
     hemicube: ResolutionsTable | None = None
     camera_triangles: TrianglesTable | None = None
     environment: SizesTable | None = None
+    depth_image: SizesTable | None = None
     shading: Literal["color", "normal", "texture", "light"] | None = None
     repeats: Annotated[int, Meta(ge=1)] | None = None
 
@@ -138,5 +199,6 @@ class SceneTable(Table, frozen=True):
     background: Color = 0.0
     mirror: MirrorTable | None = None
     environment: EnvironmentTable | None = None
+    relief: list[ReliefTable] = []
     compare: CompareTable = CompareTable()
     name: str | None = None

@@ -108,6 +108,7 @@ def _compare(table: CompareTable, text: SceneText) -> CompareSettings:
         ("hemicube", "resolutions", "resolution"),
         ("camera_triangles", "triangles", "triangles"),
         ("environment", "sizes", "size"),
+        ("depth_image", "sizes", "size"),
     ):
         values = getattr(table, method)
         if values is None:

@@ -25,7 +25,12 @@ def explain(
     whole = Scene.of(scene)
     check_shading(shading)
     prepared = prepare(camera, whole.mesh, method, **settings)
-    return Explanation((*prepared.explain(), *_shading(whole, shading, shadows)))
+    return Explanation((*prepared.explain(), *_shading(whole, shading, shadows), *_reliefs(whole)))
+
+
+def _reliefs(scene: Scene) -> Iterator[Step]:
+    for one in scene.reliefs:
+        yield Step("relief", len(one) > 0, f"{len(one)} copies of {one.relief}, followed ray by ray within their boxes")
 
 
 def _shading(scene: Scene, shading: str, shadows: bool) -> Iterator[Step]:

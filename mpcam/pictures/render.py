@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.effects.horizon_occlusion import check_screen, screen_occlusion_device
 from mpcam.effects.mirror_methods import MIRROR_METHODS
 from mpcam.effects.reflection import Reflection
+from mpcam.effects.relief_picture import ReliefPicture
 from mpcam.effects.shadows import shadow_maps
 from mpcam.errors import InputError
 from mpcam.pictures.explain import explain as explained
@@ -24,6 +26,7 @@ def render(
     shading: str = "light",
     shadows: bool = False,
     shadow_size: int = 1024,
+    occlusion: float | None = None,
     explain: bool = False,
     **settings: Any,
 ) -> np.ndarray:
@@ -31,30 +34,64 @@ def render(
 
     scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
-    shading "light". shadow_size: pixels along a side of those. method and settings: see `rasterize`. To render many
-    frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
-    seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of the true
-    surface with "raytrace", or by an "environment" map; for the settings, and for many frames, see `Reflection`.
-    explain: print to standard error which stages run, which are left out and why (see `mpcam.explain`). Raises
-    InputError.
+    shading "light". shadow_size: pixels along a side of those. occlusion: the radius, scene units, within which
+    surfaces keep ambient light from each other, by the frame's own depths (see `screen_occlusion`); for Pinhole cameras
+    and shading "light". method and settings: see `rasterize`. To render many frames of a still scene, make the maps
+    once and give them to `shade`. A scene with a mirror is shown with what is seen in it: by camera triangles with
+    method "invert", by its vertices' images with "vertex", by rays of the true surface with "raytrace", by those rays
+    and depth images with "depth_image", or by an "environment" map; for the settings, and for many frames, see
+    `Reflection`. A scene with reliefs is shown with them, by any method for the rest; for many frames see
+    `ReliefPicture`. explain: print to standard error which stages run, which are left out and why (see
+    `mpcam.explain`). Raises InputError.
     """
+    named: dict[str, Any] = {"shading": shading, "shadows": shadows, "shadow_size": shadow_size}
+    return image_and_depth(camera, scene, method, False, **named, occlusion=occlusion, explain=explain, **settings)[0]
+
+
+def image_and_depth(
+    camera: Camera,
+    scene: Any,
+    method: str,
+    depth: bool,
+    *,
+    shading: str,
+    shadows: bool,
+    shadow_size: int,
+    occlusion: float | None,
+    explain: bool,
+    **settings: Any,
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """The same as `render`, and if wanted the distances (H, W) along the rays; None in a scene with a mirror."""
     whole = Scene.of(scene)
+    if whole.mirror is not None and occlusion is not None:
+        raise InputError("occlusion is not known for scenes with a mirror: leave one of them out")
+    if whole.reliefs and whole.mirror is not None:
+        raise InputError("a mirror shows no reliefs: leave one of them out, or give the reliefs as meshes")
     if whole.mirror is not None:
-        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings)
+        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings), None
+    if whole.reliefs and occlusion is not None:
+        raise InputError("occlusion is not known for scenes with reliefs: leave one of them out")
+    if occlusion is not None:
+        check_screen(camera)
     if explain:
         found = explained(camera, whole, method, shading=shading, shadows=shadows, **settings)
         sys.stderr.write(f"{found}\n")
     maps: Any = ()
     if shadows:
         maps = shadow_maps(whole, shadow_size, shading)
-    return shade(rasterize(camera, whole.mesh, method, **settings), whole, shading, maps)
+    if whole.reliefs:
+        picture = ReliefPicture(whole, camera, method, shading=shading, shadows=maps, **settings)
+        return picture.image(), picture.depth() if depth else None
+    hits = rasterize(camera, whole.mesh, method, **settings)
+    exposure = None if occlusion is None else screen_occlusion_device(hits, occlusion)
+    return shade(hits, whole, shading, maps, exposure), hits.depth if depth else None
 
 
 def _mirrored(
     camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
 ) -> np.ndarray:
     """`render` of a scene with a mirror."""
-    names = {"invert": "camera_triangles"} | {name: name for name in ("vertex", "environment", "raytrace")}
+    names = {"invert": "camera_triangles"} | {name: name for name in MIRROR_METHODS if name != "camera_triangles"}
     if method not in names:
         raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
     allowed = [name for name in MIRROR_METHODS[names[method]].home(camera).names if name != "cams"]

@@ -24,6 +24,12 @@ _VIEWS = {
     "sphere": _View(eye=(0.0, -1.25, 0.0), target=(0.0, 0.0, 0.0)),
     "plane": _View(eye=(0.0, -0.35, 0.5), target=(0.0, 0.0, 0.0)),
     "cube": _View(eye=(-1.3, -1.7, 1.4), target=(0.0, 0.0, 0.0)),
+    "knot": _View(eye=(0.3, -2.1, 0.9), target=(0.0, 0.0, 0.0)),
+    "teapot": _View(eye=(0.3, -1.25, 0.95), target=(0.0, 0.0, 0.5)),
+    "barrel": _View(eye=(0.2, -0.62, 0.95), target=(0.0, 0.0, 0.45)),
+    "car": _View(eye=(1.5, -1.5, 1.5), target=(0.0, 0.0, 0.5)),
+    "statue": _View(eye=(1.6, -2.3, 1.9), target=(-0.3, 0.0, 1.1)),
+    "maze": _View(eye=(0.0, -5.5, 1.2), target=(0.0, 0.0, 1.1)),
 }
 
 

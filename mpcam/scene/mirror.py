@@ -18,8 +18,10 @@ class Mirror:
     surface: a Mesh (smooth unless it has facets' normals) or a Surface. index: None for a mirror; else the refractive
     index behind the surface over that on the camera's side, and the scene is seen through it. color: linear RGB, what
     is seen is multiplied by it. triangles, resolution: the camera triangles that stand for it, and pixels along the
-    short sides of each. mode: how rays run between their vertices, see `mpcam.decompose`. Raises InputError for a field
-    of the wrong kind.
+    short sides of each. mode: how rays run between their vertices, see `mpcam.decompose`. depth_images: settings of
+    method "depth_image" (size, aside, images, coarse, fine). bounces, reflectance, own: how often light is reflected,
+    and by what, for the methods that can, "depth_image" and "raytrace"; for all these see `mpcam.Reflection`. Raises
+    InputError for a field of the wrong kind.
     """
 
     surface: Any
@@ -28,6 +30,10 @@ class Mirror:
     triangles: int = 104
     resolution: int = 64
     mode: str = "normals"
+    depth_images: Any = None
+    bounces: int = 1
+    reflectance: Any = 0.0
+    own: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.surface, (Mesh, Surface)):
