@@ -86,8 +86,8 @@ def _frozen_march(model: type[Camera], static: tuple[Any, ...], size: tuple[int,
         patches, ranges, box = data
         surface = Surface(patches, ranges, box, size, levels, curved)
         (coarse, fine), leaving = numbers[12:14], numbers[14] > 0
-        project, rays = projection(camera), (start, along, usable)
-        return tuple(march(t, project, surface, *rays, coarse, fine, entry, leaves, most, leaving))
+        project = projection(camera)
+        return tuple(march(t, project, surface, start, along, usable, coarse, fine, entry, leaves, most, leaving))
 
     return kernel
 
