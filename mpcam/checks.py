@@ -27,12 +27,28 @@ def reads_as_number(text: str) -> bool:
     return True
 
 
+def number_table(value: Any) -> np.ndarray:
+    """The value as a new float64 array of any shape; (0,) where it is none of numbers."""
+    try:
+        return np.array(value, np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
+
+
+def vectors(name: str, value: Any) -> np.ndarray:
+    """The value as float64 (..., 3), finite or not; raises InputError for other shapes and what is no number."""
+    try:
+        found = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: numbers of shape (..., 3) are needed, got {shown(value)}") from None
+    if found.ndim == 0 or found.shape[-1] != 3:
+        raise InputError(f"{name} has shape {found.shape}: the last axis must have length 3")
+    return found
+
+
 def three_numbers(name: str, value: Any, hint: str = "") -> np.ndarray:
     """The value as a new array (3,); raises InputError unless it is three finite numbers. hint: what else may be."""
-    try:
-        found = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InputError(f"{name}={shown(value)}: give three finite numbers{hint}")
     return found

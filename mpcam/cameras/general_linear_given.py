@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.checks import is_number, shown, three_numbers
+from mpcam.checks import is_number, number_table, shown, three_numbers
 from mpcam.errors import InputError
 
 
@@ -63,10 +63,7 @@ def a_slit(line: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ray_rows(value: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     if found.shape != (3, 3) or not np.isfinite(found).all():
         raise InputError(f"from_rays: {name} has shape {np.shape(value)}: give (3, 3) finite numbers, a row for a ray")
     return found

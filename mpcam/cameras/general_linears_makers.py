@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mpcam.checks import is_number, shown, three_numbers, whole_number
+from mpcam.checks import is_number, number_table, shown, three_numbers, whole_number
 from mpcam.errors import InputError
 from mpcam.math import PI
 from mpcam.math.pose import look_at
@@ -226,10 +226,7 @@ def _slopes(value: Any, name: str = "slope") -> tuple[float, float]:
 
 
 def _rows(value: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     if found.ndim != 2 or found.shape[-1] != 3 or not np.isfinite(found).all():
         raise InputError(f"{name} has shape {np.shape(value)}: give finite numbers of shape (N, 3), one row per point")
     return found

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mpcam.cameras.base import register_later
-from mpcam.checks import shown, three_numbers
+from mpcam.checks import number_table, shown, three_numbers
 from mpcam.errors import InputError
 from mpcam.math import Array, library
 
@@ -81,10 +81,7 @@ def checked_ends(value: Any, name: str) -> Any:
     """A box (2, 3) or planes (m, 4) of finite numbers, normals not zero; other libraries' arrays pass."""
     if library(value) != "numpy" or type(value) is object:
         return value
-    try:
-        found = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     box, planes = found.shape == (2, 3), found.ndim == 2 and found.shape[1:] == (4,)
     if not (box or planes) or not np.isfinite(found).all():
         raise InputError(
@@ -114,10 +111,7 @@ def _polygon(value: Any) -> Any:
     """A read-only table of finite numbers; other libraries' arrays pass."""
     if library(value) != "numpy" or type(value) is object:
         return value
-    try:
-        found = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     if found.ndim != 2 or found.shape[-1] != 3 or len(found) < 3 or not np.isfinite(found).all():
         raise InputError(f"Portal: polygon={shown(value)}: give three corners or more, (n, 3), finite numbers")
     return _fixed(found)

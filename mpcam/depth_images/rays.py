@@ -6,7 +6,7 @@ import numpy as np
 
 from mpcam.backend import opaque_zero, types
 from mpcam.cameras.types import PosedRays, Ray
-from mpcam.checks import is_number, shown
+from mpcam.checks import is_number, shown, vectors
 from mpcam.errors import InputError
 from mpcam.math import library
 from mpcam.rendering.device_camera import world_rays
@@ -50,7 +50,7 @@ def rays_of(origins: Any, directions: Any) -> tuple[PosedRays, tuple[int, ...]]:
         ray = Ray(origin + zero, along + zero, zero == 0)
         dr.eval(*ray)
         return PosedRays(np.eye(4), ray), (width,)
-    start, along = (_host_vectors(name, x) for name, x in (("origins", origins), ("directions", directions)))
+    start, along = (vectors(name, x) for name, x in (("origins", origins), ("directions", directions)))
     try:
         shape = np.broadcast_shapes(start.shape, along.shape)
     except ValueError:
@@ -89,13 +89,3 @@ def _device_vectors(name: str, value: Any) -> Any:
     if library(value) != "drjit" or len(value) != 3:
         raise InputError(f"{name}: Dr.Jit Array3f are needed for both, or NumPy arrays for both")
     return types().Array3f(*value)
-
-
-def _host_vectors(name: str, value: Any) -> np.ndarray:
-    try:
-        found = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: numbers of shape (..., 3) are needed, got {shown(value)}") from None
-    if found.ndim == 0 or found.shape[-1] != 3:
-        raise InputError(f"{name} has shape {found.shape}: the last axis must have length 3")
-    return found

@@ -12,7 +12,7 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers
 from mpcam.cameras.base import Camera
-from mpcam.checks import shown, whole_number
+from mpcam.checks import number_table, shown, whole_number
 from mpcam.depth_images.depth_image import DepthImage
 from mpcam.depth_images.layered import LayeredDepthImage
 from mpcam.effects.relief_cameras import relief_camera, top_in_middle
@@ -146,10 +146,7 @@ class Relief:
 
 
 def _box(box: Any) -> np.ndarray:
-    try:
-        found = np.array(box, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(box)
     if found.shape != (2, 3) or not np.isfinite(found).all() or not (found[0] < found[1]).all():
         raise InputError(f"box={shown(box)}: give (2, 3), least and largest x, y, z, the first below the second")
     return found
@@ -163,10 +160,7 @@ def _bounds(mesh: Mesh) -> np.ndarray:
 
 
 def _color(name: str, value: Any) -> np.ndarray:
-    try:
-        found = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(value)
     if found.shape != (3,) or not np.isfinite(found).all() or (found < 0).any():
         raise InputError(f"{name}={shown(value)}: give 3 finite linear RGB numbers, none negative")
     return found

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.backend import exclusive, opaque_zero, types
-from mpcam.checks import shown
+from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.device import DeviceMesh, device_mesh
@@ -137,10 +137,7 @@ def _matrices(placements: Any) -> np.ndarray:
 
 
 def _colors(colors: Any, relief: Any) -> np.ndarray:
-    try:
-        found = np.array(colors, np.float64)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    found = number_table(colors)
     if found.ndim != 2 or found.shape[1:] != (3,) or not np.isfinite(found).all() or (found < 0).any():
         raise InputError(f"colors={shown(colors)}: give (N, 3) linear RGB numbers, none negative")
     if relief.key is None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.checks import shown
+from mpcam.checks import vectors
 from mpcam.errors import InputError
 
 
@@ -13,12 +13,7 @@ def as_vectors(values: Any, name: str, unit: bool = False) -> np.ndarray:
 
     Raises InputError for other shapes, for what is not finite, and for zero vectors that shall have length 1.
     """
-    try:
-        array = np.asarray(values, np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: numbers of shape (..., 3) are needed, got {shown(values)}") from None
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise InputError(f"{name} has shape {array.shape}: the last axis must have length 3")
+    array = vectors(name, values)
     bad = ~np.asarray(np.isfinite(array).all(-1))
     if bad.any():
         raise InputError(f"{_first(array, bad, name)}: finite numbers are needed; leave out rows that mean nothing")

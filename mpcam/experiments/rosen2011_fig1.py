@@ -8,6 +8,7 @@ import numpy as np
 from mpcam.comparison import timing
 from mpcam.comparison.metrics import flip_map, image_rmse
 from mpcam.comparison.motion import moving_vertices
+from mpcam.comparison.numbers import format_number
 from mpcam.comparison.progress import Progress, StepCounter
 from mpcam.depth_images.depth_image import DepthImage
 from mpcam.depth_images.layered import LayeredDepthImage
@@ -253,18 +254,23 @@ def _reading(rows: Rows, found: dict[str, ChosenCamera]) -> str:
     texts = []
     for thing, chosen in found.items():
         mine = {row["method"]: row for row in rows if row["thing"] == thing}
+
+        def of(label: str, key: str, digits: int = 2, mine: dict[str, Any] = mine) -> str:
+            return format_number(mine[label][key], digits)
+
         goals = [
-            f"{mine[label]['fewer']:.3g} times fewer with the {label} camera (at least {goal} wanted: "
+            f"{of(label, 'fewer', 3)} times fewer with the {label} camera (at least {goal} wanted: "
             f"{'met' if mine[label]['fewer'] >= goal else 'missed'})"
             for label, goal in ((POLE, 4), (CHOSEN, 8))
         ]
-        layered = ", ".join(f"{v['missing_percent']:.2g} % with {k}" for k, v in mine.items() if k.endswith("layers"))
+        layered = ", ".join(
+            f"{of(label, 'missing_percent')} % with {label}" for label in mine if label.endswith("layers")
+        )
         texts.append(
-            f"The {thing}: {mine[PINHOLE]['missing_percent']:.3g} % of its pixels lack their sample with a pinhole; "
-            f"{' and '.join(goals)}; {layered}. The camera was found in {chosen.seconds:.2g} s, {chosen.evaluations} "
-            f"depth images. A moving frame takes {mine[POLE]['moving_ms']:.3g} ms, {mine[POLE]['ratio']:.2g} of "
-            f"Mitsuba's; errors: {mine[PINHOLE]['rmse']:.2g} by the pinhole, {mine[POLE]['rmse']:.2g} by the single "
-            f"pole, {mine[CHOSEN]['rmse']:.2g} by the chosen one, {mine['environment']['rmse']:.2g} by the environment "
-            "map."
+            f"The {thing}: {of(PINHOLE, 'missing_percent', 3)} % of its pixels lack their sample with a pinhole; "
+            f"{' and '.join(goals)}; {layered}. The camera was found in {format_number(chosen.seconds, 2)} s, "
+            f"{chosen.evaluations} depth images. A moving frame takes {of(POLE, 'moving_ms', 3)} ms, "
+            f"{of(POLE, 'ratio')} of Mitsuba's; errors: {of(PINHOLE, 'rmse')} by the pinhole, {of(POLE, 'rmse')} by the "
+            f"single pole, {of(CHOSEN, 'rmse')} by the chosen one, {of('environment', 'rmse')} by the environment map."
         )
     return " ".join(texts)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.comparison.numbers import format_number
 from mpcam.effects.relief_picture import ReliefPicture
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Table
 
@@ -91,13 +92,18 @@ def plot_of(rows: Rows) -> Plot:
             places = np.arange(len(scenes)) + wide * (number - 0.5 * (len(kinds) - 1))
             bars = axes.bar(places, values, 0.92 * wide, color=theme.palette[number], label=kind)
             axes.bar_label(bars, fmt="%.2g", fontsize=8, color=theme.ink)
-        axes.set_xticks(np.arange(len(scenes)), [f"{count} {scene}" for scene, count in scenes])
+        axes.set_xticks(np.arange(len(scenes)), [named(scene, count) for scene, count in scenes])
         axes.set_ylabel("missing pixels, %")
         axes.grid(axis="y")
         figure.legend(loc="outside upper right", ncols=len(kinds))
 
     caption = "Pixels that should show a copy and do not, of those that should."
     return Plot("missing", caption, "Bars of missing pixels by scene and kind of relief", draw, height=3.8)
+
+
+def named(scene: str, count: int) -> str:
+    """ "40 cars", and "1 car"."""
+    return f"{count} {scene.removesuffix('s') if count == 1 else scene}"
 
 
 def reading_of(rows: Rows) -> str:
@@ -107,17 +113,21 @@ def reading_of(rows: Rows) -> str:
     said = []
     for scene, count in last:
         pole, plain = (by[scene, count, kind] for kind in ("single pole", "conventional"))
+        missing, rms = (
+            " against ".join(format_number(row[key], 2) for row in (pole, plain)) for key in ("missing", "rms")
+        )
+        moving, flat, copies = (format_number(pole[key]) for key in ("moving_ms", "moving_flat_ms", "moving_copies_ms"))
         said.append(
-            f"{count} {scene}: {pole['missing']:.2g} % of their pixels missing against {plain['missing']:.2g} % with "
-            f"the conventional relief, RMS {pole['rms']:.2g} against {plain['rms']:.2g}; moving, first hits take "
-            f"{pole['moving_ms']:.3g} ms, a tree rebuilt over all triangles {pole['moving_flat_ms']:.3g} ms, Mitsuba's "
-            f"instances {pole['moving_copies_ms']:.3g} ms; whole frames {pole['fps']:.2g} a second"
+            f"{named(scene, count)}: {missing} % of the pixels missing, RMS {rms}; "
+            f"moving, first hits take {moving} ms, a tree rebuilt over all triangles {flat} ms, Mitsuba's instances "
+            f"{copies} ms; whole frames {format_number(pole['fps'], 2)} a second"
             + (f", the paper's {pole['paper_fps']:g}" if pole.get("paper_fps") else "")
         )
     timed = [row for row in rows if "moving_ms" in row]
     won = sum(row["moving_ms"] < row["moving_copies_ms"] for row in timed)
     return (
         "The image of a single-pole camera holds the sides of a thing that an orthographic one cannot see. "
+        "Missing pixels and RMS by it against those by the conventional relief: "
         + ". ".join(said)
         + f". Reliefs that move are faster than moved instances in {won} of {len(timed)} scenes. {CARD}"
     )

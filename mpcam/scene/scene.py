@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.checks import shown
+from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.scene.mirror import Mirror
@@ -130,10 +130,7 @@ def _several(value, kind, name: str, allowed: str) -> tuple:
 
 
 def _vector(value, name: str, positive: bool = False) -> Vector:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.zeros(0)
+    array = number_table(value)
     if array.shape != (3,) or not np.all(np.isfinite(array)) or (positive and np.any(array < 0)):
         raise InputError(f"{name} is {shown(value)}: give 3 finite numbers{', none negative' if positive else ''}")
     return (float(array[0]), float(array[1]), float(array[2]))

@@ -10,8 +10,8 @@ from mpcam.stress.distant import distant_cases, focal_length, pose
 from mpcam.stress.exact import DIGITS
 from mpcam.stress.general_linear_kinds import kind_rows
 from mpcam.stress.general_linear_truth import Truth
-from mpcam.stress.inputs import BAD_PIXELS, BAD_POINTS
-from mpcam.stress.projections import images, rays, rounded
+from mpcam.stress.inputs import BAD_PIXELS
+from mpcam.stress.projections import bad_image_rows, images, rays, rounded
 from mpcam.stress.regions import bound_rows
 from mpcam.stress.report import EPS, Case, Progress, StressRow, check_counts, run_cases
 from mpcam.stress.report import LIMIT as LIMIT
@@ -101,11 +101,7 @@ def image_rows(name: str, camera: GeneralLinear, points: dict[str, np.ndarray]) 
     truth, rows = Truth(camera), []
     for kind, precision, given in rounded(points):
         rows.append(judge(name, f"images, {kind}", precision, truth, given, images(camera, given, precision)))
-    for precision in EPS:
-        pixel, depth, valid = images(camera, BAD_POINTS, precision)
-        invented = int(valid.sum() + (~np.isfinite(pixel)).sum() + (~np.isfinite(depth)).sum())
-        rows.append(StressRow(name, "images, not finite", precision, len(valid), float("nan"), 0, invented))
-    return rows
+    return rows + bad_image_rows(name, camera)
 
 
 def judge(name: str, case: str, precision: str, truth: Truth, points: np.ndarray, found: Any) -> StressRow:

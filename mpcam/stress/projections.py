@@ -20,6 +20,12 @@ def image_rows(name: str, camera: Any, exact: Exact, points: dict[str, np.ndarra
     for kind, precision, given in rounded(points):
         found = images(camera, given, precision)
         rows.append(judge_images(name, f"images, {kind}", precision, exact, given, found))
+    return rows + bad_image_rows(name, camera)
+
+
+def bad_image_rows(name: str, camera: Any) -> list[StressRow]:
+    """`local_project` of points that are none: nothing valid, and finite numbers."""
+    rows = []
     for precision in EPS:
         pixel, depth, valid = images(camera, BAD_POINTS, precision)
         invented = int(valid.sum() + (~np.isfinite(pixel)).sum() + (~np.isfinite(depth)).sum())
