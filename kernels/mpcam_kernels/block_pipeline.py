@@ -103,12 +103,11 @@ class BlockPipeline:
         if task.counts[0]:
             setups, levels = self.triangles(task)
             tell("triangles", (setups, levels))
-            everywhere = threads(types, 0, self.blocks * PIXELS // pixels.PER_THREAD)
             rays = task.rays
             for lists, rows in self.lists(task, setups, levels, canvas, tell):
                 tell("lists", lists)
                 large = Large(rows, setups, None)
-                canvas.state = self._pixels(everywhere, rays.rays, rays.corners, large, lists, canvas.state)
+                canvas.state = self._pixels(rays.runs, rays.rays, rays.corners, large, lists, canvas.state)
                 tell("pixels", canvas.state)
         buffer = self._blank() if canvas.state.buffer is None else canvas.state.buffer
         return buffer, canvas.state.counters

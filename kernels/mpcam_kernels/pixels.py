@@ -46,7 +46,6 @@ def through_lists(
         before = [key for at in fours for key in dr.gather(four, buffer, at)]
         result = dr.empty(type(buffer), dr.width(buffer))
     x, y = corner(slot) if bounded else (slot, slot)
-    start = lists.first(types, block)
 
     def allowed(number: Any, mask: Any) -> list[Any]:
         """Which pixels of the thread to test against a triangle."""
@@ -103,12 +102,14 @@ def through_lists(
     owners = [output.triangle(types, key) for key in before] if hasattr(output, "triangle") else []
     best = [output.nearness(types, key) if output.depth else key > 0 for key in before]
 
+    start = sought(lists.first(types, block))
+
     def draw(best: Any, owners: Any, tests: Any, hits: Any) -> Any:
         views[:] = samples.run(types, slot, PER_THREAD)
-        return dr.while_loop((best, owners, tests, hits, sought(start)), unfinished, body)[:4]
+        return dr.while_loop((best, owners, tests, hits, start), unfinished, body)[:4]
 
     state = (best, owners, types.UInt(0), types.UInt(0))
-    # Many blocks have no list: they need no samples.
+    # Many parts of blocks have no triangle: they need no samples.
     best, owners, tests, hits = dr.if_stmt(state, start > 0, draw, lambda *state: state)
     if output.depth:
         keys = [output.key(types, near, owners[k] if owners else None) for k, near in enumerate(best)]

@@ -25,7 +25,8 @@ class RayBlocks:
     rays: zero where a slot has no pixel. cones, slopes: of each block. group_cones, group_slopes: of each group. first,
     count: blocks of each group. numbers: GROUP numbers a group, of the block at each of its places (column + COLUMNS
     row). exist: which of these places have a block, as bits. parts: which parts of each block hold pixels, as bits.
-    corners: first column and row of each block. planes: what bounds images there (see `planes.Planes`), or None.
+    runs: runs of `pixels.PER_THREAD` slots that hold pixels, by number. corners: first column and row of each block.
+    planes: what bounds images there (see `planes.Planes`), or None.
 
     Rays, cones and slopes are those of `general_rays`, of `central_rays` or of `ray_pieces`.
     """
@@ -40,6 +41,7 @@ class RayBlocks:
     numbers: Any
     exist: Any
     parts: Any
+    runs: Any
     corners: tuple[Any, Any]
     planes: Any
 

@@ -270,7 +270,7 @@ def _reading(rows: Rows, found: dict[str, ChosenCamera]) -> str:
             f"The {thing}: {of(PINHOLE, 'missing_percent', 3)} % of its pixels lack their sample with a pinhole; "
             f"{' and '.join(goals)}; {layered}. The camera was found in {format_number(chosen.seconds, 2)} s, "
             f"{chosen.evaluations} depth images. A moving frame takes {of(POLE, 'moving_ms', 3)} ms, "
-            f"{of(POLE, 'ratio')} of Mitsuba's; errors: {of(PINHOLE, 'rmse')} by the pinhole, {of(POLE, 'rmse')} by the "
+            f"{of(POLE, 'ratio')} of Mitsuba's; error: {of(PINHOLE, 'rmse')} by the pinhole, {of(POLE, 'rmse')} by the "
             f"single pole, {of(CHOSEN, 'rmse')} by the chosen one, {of('environment', 'rmse')} by the environment map."
         )
     return " ".join(texts)

@@ -9,6 +9,7 @@ import numpy as np
 from mpcam.backend import types
 from mpcam.cameras.atlas import Atlas
 from mpcam.geometry.order import interleaved
+from mpcam_kernels.pixels import PER_THREAD
 from mpcam_kernels.ray_blocks import GROUP, SIDE, place_in_group
 from mpcam_kernels.samples import HEIGHT, PARTS, PIXELS, WIDTH, in_block
 
@@ -41,9 +42,21 @@ class BlockLayout:
     @property
     def parts(self) -> np.ndarray:
         """(B,) uint32, the parts of each block that hold pixels, as bits."""
-        part, there = PIXELS // PARTS, np.zeros(self.blocks * PARTS, bool)
-        there[self.slots[self.slots >= 0] // part] = True
-        return (there.reshape(-1, PARTS) << np.arange(PARTS)).sum(axis=1).astype(np.uint32)
+        there = self._held(PIXELS // PARTS).reshape(-1, PARTS)
+        return (there << np.arange(PARTS)).sum(axis=1).astype(np.uint32)
+
+    @property
+    def runs(self) -> np.ndarray:
+        """The runs of `pixels.PER_THREAD` slots that hold pixels, by number; the first one if none does."""
+        there = self._held(PER_THREAD)
+        there[0] |= not there.any()
+        return np.flatnonzero(there)
+
+    def _held(self, size: int) -> np.ndarray:
+        """Which runs of `size` slots hold pixels."""
+        there = np.zeros(self.blocks * PIXELS // size, bool)
+        there[self.slots[self.slots >= 0] // size] = True
+        return there
 
     @functools.cached_property
     def on_device(self) -> dict[str, Any]:
@@ -69,6 +82,7 @@ class BlockLayout:
             "numbers": numbers.ravel(),
             "exist": exist,
             "parts": self.parts,
+            "runs": self.runs,
         }
         found: dict[str, Any] = {
             name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()

@@ -110,6 +110,7 @@ def bounded(kind: str, rays: Any, layout: BlockLayout, planes: Any = None) -> An
         fixed["numbers"],
         fixed["exist"],
         fixed["parts"],
+        fixed["runs"],
         corners,
         planes,
     )

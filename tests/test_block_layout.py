@@ -1,0 +1,35 @@
+"""Blocks of pixels: which runs of slots and which parts hold pixels, recounted pixel by pixel."""
+
+import numpy as np
+import pytest
+
+from mpcam.cameras.atlas import atlas
+from mpcam.rendering.block_layout import BlockLayout, atlas_layout, image_layout, layered_layout
+
+RUN, PART, BLOCK = 8, 16, 128  # slots
+
+
+def layouts() -> dict[str, BlockLayout]:
+    some = np.flatnonzero(np.random.default_rng(3).uniform(size=45 * 19) < 0.03)
+    return {
+        "even": image_layout(64, 32),
+        "odd": image_layout(45, 19),
+        "triangles": atlas_layout(atlas((35, 7, 35, 2))),
+        "layers": layered_layout(45, 19, [(some, np.zeros_like(some)), (some[:3], np.arange(3))]),
+        "nothing": layered_layout(45, 19, []),
+    }
+
+
+@pytest.mark.parametrize("name", list(layouts()))
+def test_runs_and_parts_are_those_that_hold_pixels(name):
+    layout = layouts()[name]
+    runs, parts = set(), np.zeros(layout.blocks, int)
+    for slot in layout.slots[layout.slots >= 0].tolist():
+        runs.add(slot // RUN)
+        parts[slot // BLOCK] |= 1 << slot % BLOCK // PART
+    assert layout.runs.tolist() == (sorted(runs) or [0])
+    np.testing.assert_array_equal(layout.parts, parts)
+
+
+def test_an_image_has_a_run_for_every_eight_pixels_where_blocks_fit():
+    assert len(image_layout(64, 32).runs) == 64 * 32 // RUN
