@@ -24,7 +24,7 @@ CORNER = 0.02
 """Of a step, what it may run in a third pixel without looking at it."""
 ROUND = 1e-6
 """Of a depth, what rounding makes of it."""
-NEAR = 8.0
+NEAR = 2.0
 """Slacks of a patch within which a ray is near to it."""
 REFINE = 3
 """Times that a hit is brought nearer to its patch by the secant."""
