@@ -1,6 +1,7 @@
 """What several commands need: scenes by name and size, a machine that can run them, numbers as JSON."""
 
 import json
+import math
 import re
 import sys
 import warnings
@@ -78,6 +79,18 @@ def image_size(text: str) -> tuple[int, int]:
     if not found or 0 in (size := (int(found[1]), int(found[2] or found[1]))):
         raise InputError(f"--size {text}: give the width and height in pixels, as 640x480 or 512")
     return size
+
+
+def angle(text: str, option: str) -> float:
+    """Radians, from a text such as 1mrad, 0.05deg, 0.001rad or 0.001."""
+    found = re.fullmatch(r"([\d.eE+-]+)\s*(mrad|rad|deg)?", text.strip())
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        value = math.nan
+    if not found or not 0 < value < math.inf:
+        raise InputError(f"{option} {text}: give an angle above 0, as 1mrad, 0.05deg or, in radians, 0.001")
+    return value * {"mrad": 1e-3, "deg": math.pi / 180}.get(found[2] or "rad", 1.0)
 
 
 def check_machine() -> None:

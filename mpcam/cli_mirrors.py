@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from mpcam.cli_common import check_machine, load, print_json
+from mpcam.cli_common import angle, check_machine, load, print_json
 from mpcam.errors import InputError
 
 
@@ -44,6 +44,7 @@ def decompose(
     output: Path,
     eye: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     triangles: int | None = None,
+    max_angle: str | None = None,
     resolution: int | None = None,
     mode: str | None = None,
     json: bool = False,
@@ -55,6 +56,8 @@ def decompose(
         output: JSON file for the camera.
         eye: Point x,y,z that looks into the mirror; the scene's camera if not given.
         triangles: How many at most; those of the scene's mirror, or 104.
+        max_angle: In place of triangles, as few as leave rays off by at most so much (root mean square): 1mrad, 0.05deg
+            or, in radians, 0.001.
         resolution: Pixels along the short sides of each; those of the scene's mirror, or 64.
         mode: How rays run between vertices: normals, directions, general_linear or continuous; that of the scene's
             mirror if not given.
@@ -71,10 +74,12 @@ def decompose(
     loaded = load(scene, None).scene
     mirror = loaded.mirror or Mirror(loaded.mesh)
     seen: Any = loaded.camera if eye is None else read_point(eye, "--eye")
+    most = None if max_angle is None else angle(max_angle, "--max-angle")
     cams = cut(
         mirror.surface,
         seen,
-        triangles or mirror.triangles,
+        triangles or (mirror.triangles if most is None else None),
+        max_angle=most,
         resolution=resolution or mirror.resolution,
         index=mirror.index,
         mode=mode or mirror.mode,

@@ -45,6 +45,7 @@ class Coarsening:
 
     def __init__(self, reflector: Reflector, view: SeenPoints, triangles: int):
         self.reflector = reflector
+        own: np.ndarray | None = None  # the reflector's faces of which these are made, where they are
         if reflector.surface is not None:
             start = int(np.clip(_PER_TRIANGLE * triangles, _AT_LEAST, _AT_MOST))
             fine = Reflector(reflector.surface.mesh(start))
@@ -52,9 +53,11 @@ class Coarsening:
         else:
             vertices, normals, faces = reflector.vertices, reflector.normals, reflector.faces[reflector.usable]
             large = max(_LARGE, 2 * _PER_TRIANGLE * triangles)
+            own = np.flatnonzero(reflector.usable)
             if len(faces) > 1.5 * large:
+                own = None
                 vertices, normals, faces = _fewer(reflector, vertices, faces, large)
-        self._weights = _weights(reflector, view, vertices, normals, faces)
+        self._weights = _weights(reflector, view, vertices, normals, faces, own)
         self._mesh = vertices, normals, faces
         if len(faces) > _SHARED * triangles and triangles > 4:
             self._mesh = self._cut(_SHARED * triangles)
@@ -98,10 +101,19 @@ def _fewer(
 
 
 def _weights(
-    reflector: Reflector, view: SeenPoints, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray
+    reflector: Reflector,
+    view: SeenPoints,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    faces: np.ndarray,
+    own: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(F,) weights of the errors of faces on the reflector: 1 where the view sees it, and a little around."""
+    """(F,) weights of the errors of faces on the reflector: 1 where the view sees it, and a little around.
+
+    own: (F,) the reflector's faces that they lie on, where they are known.
+    """
     seen = np.zeros(len(reflector.vertices), bool)
     seen[reflector.faces[view.face]] = True
-    own, _, _ = reflector.closest(vertices[faces].mean(axis=1), normals[faces].sum(axis=1))
+    if own is None:
+        own, _, _ = reflector.closest(vertices[faces].mean(axis=1), normals[faces].sum(axis=1))
     return np.where(seen[reflector.faces[own]].any(axis=1), 1.0, HIDDEN)

@@ -10,6 +10,7 @@ from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import whole_number
 from mpcam.decomposition.coarse import Coarse, Coarsening
 from mpcam.decomposition.continuous import continuous
+from mpcam.decomposition.fewest import fewest_within, limit_of
 from mpcam.decomposition.reflector import Reflector, reflector_of
 from mpcam.decomposition.shared_lengths import slants
 from mpcam.decomposition.shooting import Locator, shoot
@@ -40,19 +41,21 @@ _INNER = np.array(
 def decompose(
     reflector: Mesh | Surface,
     eye: Any,
-    triangles: int = 104,
+    triangles: int | None = None,
     *,
     resolution: Any = 64,
     index: float | None = None,
     mode: str = "normals",
+    max_angle: float | None = None,
+    max_error: float | None = None,
 ) -> CameraTriangles:
     """Camera triangles that stand for a reflector, or with `index` for a refractor, as an eye sees it.
 
     reflector: a Mesh (one without normals is taken for smooth; `Mesh.flat` makes facets) or a Surface. eye: a point
-    (3,) in the world, or a camera with a common center. triangles: how many camera triangles at most; those that the
-    eye does not see (hidden by the reflector itself, or outside of the camera's image) are left out and do not count. A
-    mesh of fewer triangles is taken as it is, which is exact; where the shape needs more to stay whole (a closed
-    surface has 4, some of them seen), there are more. resolution: pixels along the short sides of each triangle in the
+    (3,) in the world, or a camera with a common center. triangles: how many camera triangles at most, 104; those that
+    the eye does not see (hidden by the reflector itself, or outside of its image) are left out and do not count. A mesh
+    of fewer triangles is taken as it is, which is exact; where the shape needs more to stay whole (a closed surface has
+    4, some of them seen), there are more. resolution: pixels along the short sides of each triangle in the
     atlas. index: refractive index behind the surface over that on the eye's side, None for a mirror. mode: "normals"
     bends the rays pixel by pixel; the others only at the vertices. "directions": unit directions in between (Hou et al.
     2006); "general_linear": each triangle a general linear camera in its own plane (Yu et al. 2009, section 5.2), with
@@ -60,19 +63,31 @@ def decompose(
     triangle is nearly general linear and rays are no worse than those of "directions", without a seam (see
     `decomposition.continuous`).
 
+    max_angle, max_error: in place of triangles, the fewest whose rays are off by at most so many radians, or scene
+    units in a plane two radii away; root mean squares by `ray_error`, over what this eye sees.
+
     Vertices lie on the true surface and have its normals. Both sides of the surface count. Returns CameraTriangles in
-    the world frame. Raises InputError for an eye that sees nothing of the reflector or lies on it, and for other
-    values.
+    the world frame. Raises InputError for an eye that sees nothing of the reflector or lies on it, an error that
+    100,000 triangles exceed, and for other values.
     """
     if mode not in MODES:
         raise InputError(f"mode={mode!r}: allowed are {', '.join(MODES)}")
-    triangles = whole_number("triangles", triangles, 1, MOST)
+    limit = limit_of(triangles, max_angle, max_error)
     whole = reflector_of(reflector)
     view = view_of(whole, eye)
-    coarse = _seen_part(whole, view, triangles)
-    cams = CameraTriangles(
-        coarse.vertices, coarse.faces, normals=coarse.normals, eye=view.eye, resolution=resolution, index=index
-    )
+
+    def cut(count: int) -> CameraTriangles:
+        coarse = _seen_part(whole, view, count)
+        known = {"normals": coarse.normals, "eye": view.eye, "resolution": resolution, "index": index}
+        return in_mode(CameraTriangles(coarse.vertices, coarse.faces, **known), mode, whole, eye)
+
+    if limit is None:
+        return cut(whole_number("triangles", 104 if triangles is None else triangles, 1, MOST))
+    return fewest_within(cut, limit, whole, eye, MOST)
+
+
+def in_mode(cams: CameraTriangles, mode: str, whole: Reflector, eye: Any) -> CameraTriangles:
+    """Camera triangles with normals, their rays as a mode says."""
     if mode == "normals":
         return cams
     direct = directions_at_vertices(cams)

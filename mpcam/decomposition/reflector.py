@@ -17,6 +17,8 @@ from mpcam.geometry.surfaces import Surface
 FINE = 40_000
 """Triangles of the mesh that stands for an analytic surface where rays are traced; points are put on it exactly."""
 _CHUNK = 1 << 21
+_ALIKE = 1.5
+"""Triangles whose sizes differ by fewer powers of two are searched together."""
 
 
 class FirstHits(NamedTuple):
@@ -183,36 +185,62 @@ class Reflector:
         return (distance - 1.0) * np.linalg.norm(way, axis=-1) > -slack * self.radius
 
     def closest(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Faces (N,) nearest to points (N, 3) among those on the side of normals (N, 3), and weights 2 and 3 there."""
-        tree, numbers, reach = self._centers
-        count = len(points)
-        face, second, third = np.zeros(count, np.int64), np.zeros(count), np.zeros(count)
-        left, near = np.arange(count), 16
-        while len(left):
-            near = min(near, len(numbers))
-            step = max(_CHUNK // near // 4, 1)
-            done = np.zeros(len(left), bool)
-            for i in range(0, len(left), step):
-                rows = left[i : i + step]
-                away, found = (v.reshape(len(rows), near) for v in tree.query(points[rows], near))
-                candidates = numbers[found]
-                w2, w3, gap = _nearest_in(self.vertices[self.faces[candidates]], points[rows][:, None])
-                fits = (self.face_normals[candidates] * normals[rows][:, None]).sum(-1) > 0
-                everything = near == len(numbers)
-                gap = np.where(fits | (everything & ~fits.any(1, keepdims=True)), gap, np.inf)
-                best = gap.argmin(axis=1)
-                row = np.arange(len(rows))
-                face[rows], second[rows], third[rows] = candidates[row, best], w2[row, best], w3[row, best]
-                done[i : i + step] = everything | (gap[row, best] <= away[:, -1] - reach)
-            left, near = left[~done], near * 4
+        """Faces (N,) nearest to points (N, 3) among those on the side of normals (N, 3), and weights 2 and 3 there.
+
+        Where there are none on that side, those on the other one count.
+        """
+        face, second, third, gap = self._closest(points, normals)
+        lost = np.flatnonzero(np.isinf(gap))
+        if len(lost):
+            face[lost], second[lost], third[lost], _ = self._closest(points[lost], None)
         return face, second, third
 
+    def _closest(
+        self, points: np.ndarray, normals: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As `closest`, and how far away they are, infinite for none; without normals both sides count."""
+        count = len(points)
+        face, second, third = np.zeros(count, np.int64), np.zeros(count), np.zeros(count)
+        nearest = np.full(count, np.inf)
+        for tree, numbers, reach in self._centers:
+            left, near = np.arange(count), 16
+            while len(left):
+                near = min(near, len(numbers))
+                step = max(_CHUNK // near // 4, 1)
+                done = np.full(len(left), near == len(numbers))
+                for i in range(0, len(left), step):
+                    rows = left[i : i + step]
+                    away, found = (v.reshape(len(rows), near) for v in tree.query(points[rows], near))
+                    candidates = numbers[found]
+                    w2, w3, gap = _nearest_in(self.vertices[self.faces[candidates]], points[rows][:, None])
+                    if normals is not None:
+                        fits = (self.face_normals[candidates] * normals[rows][:, None]).sum(-1) > 0
+                        gap = np.where(fits, gap, np.inf)
+                    row, best = np.arange(len(rows)), gap.argmin(axis=1)
+                    better = gap[row, best] < nearest[rows]
+                    mine, row, best = rows[better], row[better], best[better]
+                    face[mine], nearest[mine] = candidates[row, best], gap[row, best]
+                    second[mine], third[mine] = w2[row, best], w3[row, best]
+                    done[i : i + step] |= nearest[rows] <= away[:, -1] - reach
+                left, near = left[~done], near * 4
+        return face, second, third, nearest
+
     @functools.cached_property
-    def _centers(self) -> tuple[KDTree, np.ndarray, float]:
+    def _centers(self) -> list[tuple[KDTree, np.ndarray, float]]:
+        """Trees of the centers of triangles of like size, their numbers, and how far they reach from these.
+
+        The largest come first: they are few, and one tree of all would have to be searched as far as they reach.
+        """
         numbers = np.flatnonzero(self.usable)
         corners = self.vertices[self.faces[numbers]]
         center = corners.mean(axis=1)
-        return KDTree(center), numbers, float(np.linalg.norm(corners - center[:, None], axis=-1).max())
+        reach = np.linalg.norm(corners - center[:, None], axis=-1).max(axis=1)
+        kind = np.floor(np.log2(np.maximum(reach, 1e-6 * reach.max()) / reach.max()) / _ALIKE)
+        found = []
+        for one in np.unique(kind)[::-1]:
+            mine = kind == one
+            found.append((KDTree(center[mine]), numbers[mine], float(reach[mine].max())))
+        return found
 
 
 @functools.lru_cache(maxsize=8)
