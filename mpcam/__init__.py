@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from mpcam.effects.visualization import unrolled as unrolled
     from mpcam.errors import InputError as InputError
     from mpcam.errors import SetupError as SetupError
+    from mpcam.fitting.choose import choose_decomposition as choose_decomposition
     from mpcam.fitting.fit import fit as fit
     from mpcam.fitting.general_linear import GeneralLinearFit as GeneralLinearFit
     from mpcam.fitting.general_linear import fit_general_linear as fit_general_linear
@@ -124,6 +125,7 @@ _HOMES = {
     "mpcam.effects.traced_occlusion": "traced_occlusion",
     "mpcam.effects.visualization": "Unrolled surround unrolled",
     "mpcam.errors": "InputError SetupError",
+    "mpcam.fitting.choose": "choose_decomposition",
     "mpcam.fitting.fit": "fit",
     "mpcam.fitting.general_linear": "GeneralLinearFit fit_general_linear",
     "mpcam.fitting.result": "Fit",

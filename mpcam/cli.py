@@ -13,6 +13,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 import mpcam
 from mpcam.cli_common import View, check_machine, image_size, load, print_json, say_warnings
+from mpcam.cli_fit import fit
 from mpcam.cli_mirrors import InMirror, caustics, decompose, surround
 from mpcam.errors import InputError, SetupError
 from mpcam_kernels.backend import BackendError
@@ -201,7 +202,7 @@ def render(
         write_image(output, image, depth=depth, camera=camera if layers else None)
 
 
-for command in (decompose, caustics, surround):
+for command in (decompose, fit, caustics, surround):
     app.command(command)
 
 

@@ -30,7 +30,14 @@ ROOMS = {
     "stress": ("mpcam.stress",),
     "experiments": ("mpcam.experiments",),
     "front": ("mpcam",),
-    "command line": ("mpcam.doctor", "mpcam.cli", "mpcam.cli_common", "mpcam.cli_mirrors", "mpcam.__main__"),
+    "command line": (
+        "mpcam.doctor",
+        "mpcam.cli",
+        "mpcam.cli_common",
+        "mpcam.cli_fit",
+        "mpcam.cli_mirrors",
+        "mpcam.__main__",
+    ),
 }
 """Rooms by name, from the ground up, each with its packages and modules: a room may import those before it alone."""
 

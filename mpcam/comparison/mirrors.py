@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.comparison import metrics, timing
 from mpcam.comparison.motion import moving_frame
 from mpcam.comparison.plan import Choice, knob
@@ -101,6 +102,15 @@ def mirror_rows(
         for label, found in timing.measure(calls, repeats, warmup, on_call=steps.done).items():
             rows[label] = replace(rows[label], moving_ms=1e3 * found.median, moving_spread=1e3 * found.spread)
     return list(rows.values()), images, truth
+
+
+def frame_times(scene: Scene, camera: Any, decompositions: Sequence[CameraTriangles]) -> list[float]:
+    """Seconds that a picture of a scene with a mirror takes by each of several decompositions, medians side by side."""
+    calls = {
+        str(number): Reflection(scene, camera, method="camera_triangles", cams=cams).frame
+        for number, cams in enumerate(decompositions)
+    }
+    return [found.median for found in timing.measure(calls, repeats=9, warmup=2).values()]
 
 
 def _note(method: str) -> str:

@@ -57,12 +57,20 @@ def fewest_within(
 
 
 def fewest(
-    make: Callable[[int], T], error: Callable[[T], float], most: float, start: int, largest: int, what: str
+    make: Callable[[int], T],
+    error: Callable[[T], float],
+    most: float,
+    start: int,
+    largest: int,
+    what: str,
+    *,
+    below: bool = True,
 ) -> T:
     """What `make` gives for the smallest number at which `error` is at most `most`.
 
     Errors are taken to fall about as one over the number. start: where to begin, largest: where to give up. what: to be
-    achieved, for the message. Raises InputError where the largest number is not enough.
+    achieved, for the message. below: whether smaller numbers than the one found are looked at. Raises InputError where
+    the largest number is not enough.
     """
     good: tuple[int, T] | None = None
     bad, count = 0, min(start, largest)
@@ -85,7 +93,7 @@ def fewest(
         if good is not None and bad and not bad * CLOSE <= count <= high:
             count = round(math.sqrt(bad * good[0]))
         count = min(max(count, low), high)
-    for part in BELOW:
+    for part in BELOW if below else ():
         count = math.floor(part * good[0])
         if count <= 0 or count == bad:
             continue

@@ -102,6 +102,8 @@ class Reflection:
             return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index, mode=mode)
 
         cams = given.get("cams")
+        if cams is None and not {"triangles", "resolution"} & given.keys():
+            cams = mirror.camera_triangles
         if self.method == "camera_triangles":
             found = decomposed(given.get("resolution", mirror.resolution), mirror.mode) if cams is None else cams
             return ByTriangles(camera, mesh, mirror.surface, found, self.shaded)

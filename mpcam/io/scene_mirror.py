@@ -26,7 +26,18 @@ def build_mirror(table: MirrorTable, folder: Path, text: SceneText) -> Mirror:
         tint = color(table.color, text, "mirror", "color")
         triangles = (table.triangles, table.resolution, table.mode)
         orders = (table.bounces, table.reflectance, table.own)
-        return Mirror(surface, table.index, tint, *triangles, _depth_images(table, folder, text), *orders)
+        images, fitted = _depth_images(table, folder, text), _camera_triangles(table, folder, text)
+        return Mirror(surface, table.index, tint, *triangles, images, *orders, fitted)
+
+
+def _camera_triangles(table: MirrorTable, folder: Path, text: SceneText) -> Any:
+    """Those of a file that `mpcam fit` wrote."""
+    if table.camera_triangles is None:
+        return None
+    from mpcam.io.fits import read_fit
+
+    with text.at("mirror", "camera_triangles"):
+        return read_fit(folder / table.camera_triangles)
 
 
 def _depth_images(table: MirrorTable, folder: Path, text: SceneText) -> dict[str, Any] | None:

@@ -81,6 +81,7 @@ class MirrorTable(Table, frozen=True):
     bounces: Annotated[int, Meta(ge=1, le=8)] = 1  # how often rays are reflected, where a method can
     reflectance: Share | list[Share] = 0.0  # part of the light that the meshes reflect, with more than one bounce
     own: bool = False  # whether the mirror is seen in itself, with more than one bounce
+    camera_triangles: str | None = None  # .npz file of `mpcam fit`, for this camera: in place of cutting the mirror
 
 
 class GridTable(Table, frozen=True):

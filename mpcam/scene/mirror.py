@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import is_number, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
@@ -20,8 +21,9 @@ class Mirror:
     is seen is multiplied by it. triangles, resolution: the camera triangles that stand for it, and pixels along the
     short sides of each. mode: how rays run between their vertices, see `mpcam.decompose`. depth_images: settings of
     method "depth_image" (size, aside, images, coarse, fine). bounces, reflectance, own: how often light is reflected,
-    and by what, for the methods that can, "depth_image" and "raytrace"; for all these see `mpcam.Reflection`. Raises
-    InputError for a field of the wrong kind.
+    and by what, for the methods that can, "depth_image" and "raytrace"; for all these see `mpcam.Reflection`.
+    camera_triangles: CameraTriangles, or what `mpcam.fit` returned, made for the eye of the scene's camera; they are
+    taken wherever no other number of triangles is asked for. Raises InputError for a field of the wrong kind.
     """
 
     surface: Any
@@ -34,12 +36,19 @@ class Mirror:
     bounces: int = 1
     reflectance: Any = 0.0
     own: bool = False
+    camera_triangles: Any = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.surface, (Mesh, Surface)):
             raise InputError(
                 f"mirror surface is a {type(self.surface).__name__}: give a Mesh or a Surface, e.g. Surface.sphere()"
             )
+        given = getattr(self.camera_triangles, "camera", self.camera_triangles)
+        if given is not None and not isinstance(given, CameraTriangles):
+            raise InputError(
+                f"mirror camera_triangles is a {type(given).__name__}: give CameraTriangles, or what mpcam.fit returned"
+            )
+        object.__setattr__(self, "camera_triangles", given)
         if self.index is not None:
             if not is_number(self.index) or self.index <= 0:
                 raise InputError(
