@@ -19,6 +19,7 @@ from ray_fields import wrong_pixels
 from triangle_cameras import centers
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.capabilities import Bends, Bounds, HasRays, Projects
 from mpcam.cameras.registry import snake_case
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
@@ -179,7 +180,7 @@ def float32_agrees(camera: mp.Camera) -> None:
     """JAX and Dr.Jit in single precision against NumPy in double, away from the rim."""
     pixels = inner_pixels(camera, 400, 0.1 * min(camera.width, camera.height))
     exact = camera.ray(pixels)
-    kernels = camera.ray(device.Array2f(*pixels.T.astype(np.float32)))
+    kernels = camera.ray(device.Array2f(*map(aligned, pixels.T)))
     for origin, direction, valid in (
         camera.ray(jnp.asarray(pixels, jnp.float32)),
         (kernels.origin.numpy().T, kernels.direction.numpy().T, kernels.valid.numpy()),
@@ -190,7 +191,7 @@ def float32_agrees(camera: mp.Camera) -> None:
     if not isinstance(camera, Projects) or camera.images_per_point > FEW:
         return
     points, there = along(camera, pixels, np.full(400, 3.0))
-    images = camera.project(device.Array3f(*points.T.astype(np.float32)))
+    images = camera.project(device.Array3f(*map(aligned, points.T)))
     plain = camera.project(jnp.asarray(points, jnp.float32))
     for pixel, valid in (
         (np.stack([part.numpy().T for part in images.pixel], 1), np.stack([part.numpy() for part in images.valid], 1)),
