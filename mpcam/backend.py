@@ -39,6 +39,26 @@ def types() -> Any:
         raise SetupError(str(error)) from None
 
 
+def aligned(values: Any, dtype: Any = np.float32) -> np.ndarray:
+    """A flat copy (N,) of an array, at an address that vector instructions like: a multiple of 64.
+
+    Dr.Jit takes NumPy's memory as it is, and its kernels are others for arrays at other addresses. NumPy chooses those
+    by chance: without this, what was compiled once, and kept on the disk, would be compiled again every so often.
+    """
+    values = np.asarray(values)
+    flat = aligned_room(values.size, dtype)
+    flat.reshape(values.shape)[...] = values
+    return flat
+
+
+def aligned_room(count: int, dtype: Any = np.float32) -> np.ndarray:
+    """Memory (count,) at such an address, to be written."""
+    size = count * np.dtype(dtype).itemsize
+    memory = np.empty(size + 64, np.uint8)
+    first = -memory.ctypes.data % 64
+    return memory[first : first + size].view(dtype)
+
+
 def opaque_numbers(numbers: list[Any]) -> list[Any]:
     """Numbers as one-element device arrays, so that kernels do not change when they do."""
     import drjit as dr

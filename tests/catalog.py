@@ -1,5 +1,7 @@
 """Cameras and meshes that several tests share."""
 
+import functools
+
 import numpy as np
 
 import mpcam as mp
@@ -12,9 +14,19 @@ POSE = mp.look_at((0.3, -0.2, 0.1), (0.5, 1.0, 0.7))
 
 def registered(width: int = 64, height: int = 64, pose: np.ndarray | None = None) -> dict[str, mp.Camera]:
     """The examples of all models in the register, by their names, with the model's before those that are taken."""
+    rows = None if pose is None else tuple(map(tuple, np.asarray(pose).tolist()))
+    return dict(_examples(tuple(MODELS.values()), width, height, rows))
+
+
+@functools.cache
+def _examples(
+    models: tuple[type[mp.Camera], ...], width: int, height: int, pose: tuple[tuple[float, ...], ...] | None
+) -> dict[str, mp.Camera]:
+    """Made once: hundreds of tests take one of them each."""
+    matrix = None if pose is None else np.array(pose)
     found: dict[str, mp.Camera] = {}
-    for model in MODELS.values():
-        for name, camera in model.examples(width, height, pose).items():
+    for model in models:
+        for name, camera in model.examples(width, height, matrix).items():
             known = name in found or name == "default"
             found[f"{snake_case(model.__name__)} {name}" if known else name] = camera
     return found

@@ -19,6 +19,7 @@ from ray_fields import wrong_pixels
 from triangle_cameras import centers
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.capabilities import Bends, Bounds, HasRays, Projects
 from mpcam.cameras.registry import snake_case
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
@@ -179,7 +180,7 @@ def float32_agrees(camera: mp.Camera) -> None:
     """JAX and Dr.Jit in single precision against NumPy in double, away from the rim."""
     pixels = inner_pixels(camera, 400, 0.1 * min(camera.width, camera.height))
     exact = camera.ray(pixels)
-    kernels = camera.ray(device.Array2f(*pixels.T.astype(np.float32)))
+    kernels = camera.ray(device.Array2f(*map(aligned, pixels.T)))
     for origin, direction, valid in (
         camera.ray(jnp.asarray(pixels, jnp.float32)),
         (kernels.origin.numpy().T, kernels.direction.numpy().T, kernels.valid.numpy()),
@@ -190,7 +191,7 @@ def float32_agrees(camera: mp.Camera) -> None:
     if not isinstance(camera, Projects) or camera.images_per_point > FEW:
         return
     points, there = along(camera, pixels, np.full(400, 3.0))
-    images = camera.project(device.Array3f(*points.T.astype(np.float32)))
+    images = camera.project(device.Array3f(*map(aligned, points.T)))
     plain = camera.project(jnp.asarray(points, jnp.float32))
     for pixel, valid in (
         (np.stack([part.numpy().T for part in images.pixel], 1), np.stack([part.numpy() for part in images.valid], 1)),
@@ -212,7 +213,7 @@ def gradients_match_differences(camera: mp.Camera) -> None:
             ray = jax.tree_util.tree_unflatten(tree, numbers).ray(pixel)
             return ray.origin, ray.direction
 
-        compare_gradients(rays, leaves, pixels)
+        compare_gradients(rays, leaves, pixels, whole=isinstance(camera, Bends))
         if not isinstance(camera, Projects) or camera.images_per_point > FEW:
             return
         points, _ = along(camera, pixels, np.full(4, 2.5))
@@ -222,11 +223,14 @@ def gradients_match_differences(camera: mp.Camera) -> None:
             image = jax.tree_util.tree_unflatten(tree, numbers).project(point)
             return tuple(jnp.where(valid[..., None], part, 0.0) for part in (image.pixel, image.depth[..., None]))
 
-        compare_gradients(images, leaves, points)
+        compare_gradients(images, leaves, points, whole=isinstance(camera, Bends))
 
 
-def compare_gradients(function: Callable[..., Any], leaves: list[Any], given: np.ndarray) -> None:
-    """Of a random mean of the arrays that function(leaves, given) gives, along a random way in each leaf."""
+def compare_gradients(function: Callable[..., Any], leaves: list[Any], given: np.ndarray, whole: bool = False) -> None:
+    """Of a random mean of the arrays that function(leaves, given) gives, along a random way in each leaf.
+
+    whole: compiled as one, which is faster where one operation after the other are very many.
+    """
     rng = np.random.default_rng(5)
     numbers = [np.asarray(leaf, np.float64) for leaf in (*leaves, given)]
     shapes = [np.shape(part) for part in function(numbers[:-1], numbers[-1])]
@@ -235,7 +239,8 @@ def compare_gradients(function: Callable[..., Any], leaves: list[Any], given: np
     def mean(values: Any) -> Any:
         return sum((w * part).sum() for w, part in zip(weights, function(values[:-1], values[-1]), strict=True))
 
-    exact = jax.grad(mean)([jnp.asarray(value) for value in numbers])
+    gradient = jax.jit(jax.grad(mean)) if whole else jax.grad(mean)
+    exact = gradient([jnp.asarray(value) for value in numbers])
     for place, (value, found) in enumerate(zip(numbers, map(np.asarray, exact), strict=True)):
         assert np.isfinite(found).all()
         along = rng.normal(size=value.shape) * np.maximum(1.0, np.abs(value))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from kit import extent
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.outline import outline
 
 
@@ -50,7 +51,7 @@ BOXES = [
 def test_boxes_hold_in_float32_kernels(camera, quick):
     corners = triangles(500, seed=5)
     low, high, seen = extent(camera, corners)
-    corner = [types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)]
+    corner = [types.Array3f(*map(aligned, corners[:, i].T)) for i in range(3)]
     box = outline(camera, *corner) if quick and hasattr(camera, "local_outline") else camera.local_bound(*corner)
     # The kernels widen boxes by more than float32 may move them.
     box = mp.Box(*(np.asarray(array.numpy()) for array in box[:3]))
@@ -74,7 +75,7 @@ def test_lines_of_outlines_hold_every_sampled_point(name, precision, size):
     if precision == "float64":
         lines = np.stack([np.stack(line) for line in kernel_outline(camera, corners).lines])
     else:
-        found = kernel_outline(camera, corners, lambda p: types.Array3f(*p.astype(np.float32)))
+        found = kernel_outline(camera, corners, lambda p: types.Array3f(*map(aligned, p)))
         lines = np.stack([np.stack([np.asarray(n.numpy()) for n in line]) for line in found.lines]).astype(np.float64)
     known = np.abs(lines[:, :2]).sum((0, 1)) > 0
     distance = np.einsum("kin,npi->nkp", lines[:, :2], pixel) + lines[:, 2].T[..., None]
@@ -157,7 +158,7 @@ def test_quads_of_small_triangles_are_small_in_float32(name):
     corners = triangles(500, seed=10)
     corners[..., 2] = np.abs(corners[..., 2]) + 0.1
     corners = corners[:, :1] + 1e-3 * (corners - corners[:, :1])
-    box = camera.local_bound_quads(*(types.Array3f(*corners[:, i].T.astype(np.float32)) for i in range(3)))
+    box = camera.local_bound_quads(*(types.Array3f(*map(aligned, corners[:, i].T)) for i in range(3)))
     size = (np.asarray(box.high.numpy()) - np.asarray(box.low.numpy())).T
     tight = camera.bound(corners)
     assert (size < 2 * (tight.high - tight.low).max(-1, keepdims=True) + 0.05).all()

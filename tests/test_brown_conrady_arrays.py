@@ -16,6 +16,7 @@ from catalog import POSE
 from test_brown_conrady import LENSES, stretch
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras import folds
 from mpcam.cameras.change import resized
 from mpcam.cameras.distortion import Distortion
@@ -43,7 +44,7 @@ def test_projection_does_not_depend_on_distance(lens, scale):
     near = lens.project(points)
     assert near.valid.all()
     assert np.allclose(lens.project(points * scale).pixel, near.pixel, rtol=1e-12)
-    far = lens.project(types.Array3f(*(points * scale).T.astype(np.float32)))
+    far = lens.project(types.Array3f(*map(aligned, (points * scale).T)))
     assert np.allclose(far.pixel[0].numpy().T, near.pixel[:, 0], rtol=2e-6, atol=1e-3)
 
 
@@ -57,7 +58,7 @@ def test_float32_and_jax_agree_with_float64(lens):
     pixels = np.random.default_rng(11).uniform(0, 1, (2000, 2)) * [lens.width, lens.height]
     ray = lens.ray(pixels)
     on_device: Any = unposed(lens)
-    device = on_device.local_ray(types.Array2f(*pixels.T.astype(np.float32)))
+    device = on_device.local_ray(types.Array2f(*map(aligned, pixels.T)))
     with jax.enable_x64(True):
         traced = traced_ray(numbers_of(lens), pixels)
     for other in (device.valid, traced.valid):
@@ -68,7 +69,7 @@ def test_float32_and_jax_agree_with_float64(lens):
     assert np.abs(device.direction.numpy().T - ray.direction)[sure].max() < 2e-5
     assert np.abs(np.asarray(traced.direction) - ray.direction)[sure].max() < 1e-13
     points = 3 * ray.direction[sure]
-    image = on_device.local_project(types.Array3f(*points.T.astype(np.float32)))[0]
+    image = on_device.local_project(types.Array3f(*map(aligned, points.T)))[0]
     off = np.abs(image.pixel.numpy().T - lens.project(points).pixel[:, 0]).max(-1)
     assert (off < 1e-6 * (stretch(lens, points / points[:, 2:]) + 100)).all()
 

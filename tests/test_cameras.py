@@ -9,6 +9,7 @@ import pytest
 from catalog import NAMES, POSE, cameras, own
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.capabilities import Bends
 from mpcam.cameras.serialize import camera_to_json
 
@@ -118,7 +119,10 @@ def test_cosine_sphere_keeps_solid_angle_times_cosine():
 
 def test_double_precision_on_dr_jit(camera):
     points = camera.ray(PIXELS).direction * 3 + camera.eye
-    exact, device = camera.project(points), camera.project(types.Array3f64(*points.T))
+    exact, device = (
+        camera.project(points),
+        camera.project(types.Array3f64(*(aligned(row, np.float64) for row in points.T))),
+    )
     inside = exact.valid[:, 0]
     assert np.abs(device.pixel[0].numpy().T[inside] - exact.pixel[inside, 0]).max() < 1e-6
 
@@ -140,7 +144,7 @@ def test_projection_does_not_depend_on_distance(camera, scale):
     points = np.array([[0.3, -0.2, 0.9], [1e-6, 0, 1.0], [0.0, 0.0, 1.0]])
     near = camera.project(points).pixel
     assert np.allclose(camera.project(points * scale).pixel, near, atol=1e-9)
-    far = camera.project(types.Array3f(*(points * scale).T.astype(np.float32)))
+    far = camera.project(types.Array3f(*map(aligned, (points * scale).T)))
     assert np.allclose(far.pixel[0].numpy().T, near[:, 0], atol=1e-3)
 
 

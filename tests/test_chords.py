@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.chords import chord_pieces, radial_bound_triangles
 from mpcam.cameras.outline import Outline
 
@@ -99,7 +100,7 @@ def test_pieces_hold_in_float32_kernels(name):
     camera = CAMERAS[name]
     corners = np.concatenate(list(families(150, 12).values())).astype(np.float32)
     pixel, seen = seen_points(camera, corners.astype(np.float64))
-    found = camera.local_bound_triangles(*(types.Array3f(*corners[:, i].T) for i in range(3)))
+    found = camera.local_bound_triangles(*(types.Array3f(*map(aligned, corners[:, i].T)) for i in range(3)))
     dr.eval([[*piece.lines, piece.low, piece.high, piece.valid] for piece in found])
     pieces = [
         Outline(p.low.numpy(), p.high.numpy(), p.valid.numpy(), tuple(line.numpy() for line in p.lines)) for p in found

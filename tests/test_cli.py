@@ -12,6 +12,7 @@ import pytest
 import mpcam
 from mpcam.cameras.serialize import camera_to_json
 from mpcam.cli import main
+from mpcam.comparison import driver
 
 COMMANDS = ("compare", "render", "project", "experiment", "doctor")
 
@@ -153,19 +154,26 @@ def test_image_and_scene_give_project_its_camera(tmp_path, capsys):
     assert rows[0][1:3] != rows[1][1:3]  # at another pixel in another projection
 
 
-def test_compare_writes_and_prints(tmp_path, capsys):
-    folder = tmp_path / "out"
+def test_compare_writes_and_prints(tmp_path, monkeypatch, capsys):
+    folder, kept = tmp_path / "out", []
     arguments = ["compare", "cube", "--output", str(folder), "--methods", "invert,raytrace", "--repeats", "1"]
-    assert main([*arguments, "--size", "32", "--json"]) == 0
+    arguments += ["--size", "32"]
+    measure = driver.compare
+    monkeypatch.setattr(driver, "compare", lambda *given, **named: kept.append(measure(*given, **named)) or kept[-1])
+    assert main([*arguments, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert [row["method"] for row in answer["rows"]] == ["invert", "raytrace"]
     assert (folder / "report.html").is_file()
-    assert main([*arguments, "--size", "32", "--quiet"]) == 0
+    # The other ways to print it need nothing measured anew.
+    asked = []
+    monkeypatch.setattr(driver, "compare", lambda *_, **named: asked.append(named["output"]) or kept[0])
+    assert main([*arguments, "--quiet"]) == 0
     assert capsys.readouterr().out == ""
-    assert main([*arguments, "--size", "32"]) == 0
+    assert main(arguments) == 0
     out = capsys.readouterr().out
     assert "raytrace" in out
     assert "report.html" in out
+    assert list(map(str, asked)) == [str(folder)] * 2
 
 
 def test_unfit_machine_is_told_what_to_install(tmp_path):

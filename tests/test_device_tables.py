@@ -1,9 +1,13 @@
 """Tables on the device, worked out once more in a plain way: meshes around their anchor, blocks of pixels."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import mpcam as mp
+from mpcam.backend import aligned, aligned_room
 from mpcam.rendering import device
 from mpcam.rendering.block_layout import atlas_layout, image_layout
 
@@ -74,3 +78,22 @@ def test_no_pixel_is_tested_where_camera_triangles_have_none():
     slots = atlas_layout(cams.atlas).slots
     runs = len({slot // 8 for slot in slots.tolist() if slot >= 0})
     assert mp.rasterize(cams, wall).stats.tests == 8 * runs == 576
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, bool])
+def test_uploads_begin_where_kernels_are_always_the_same(dtype):
+    memory = np.arange(5000) % 7
+    kept = []
+    for shift, shape in enumerate([(1,), (3, 5), (0,), (7, 11, 3), (1000,), (0, 3)] * 4):
+        values = memory[shift : shift + int(np.prod(shape))].reshape(shape).T
+        kept += [aligned(values, dtype), aligned_room(values.size, dtype)]
+        assert np.array_equal(kept[-2], values.ravel().astype(dtype)) and not np.shares_memory(kept[-2], memory)
+        assert all(x.ctypes.data % 64 == 0 and x.dtype == dtype and len(x) == values.size for x in kept[-2:] if x.size)
+
+
+def test_nothing_else_of_numpy_is_uploaded():
+    """Kernels differ by the address of what is taken as it is. Tables of few numbers are gathered from, and may be."""
+    package = Path(mp.__file__).parent
+    upload = re.compile(r"\.(?:Float|Float64|Int|UInt|Bool)\((?:np\.|[^()]*\.(?:astype|ravel)\().*")
+    found = [match for path in package.rglob("*.py") for match in upload.findall(path.read_text(encoding="utf-8"))]
+    assert found == [".Float(np.array(numbers, np.float32))"]

@@ -1,6 +1,8 @@
 """The experiments in their quick form: rows, files, page, and figures that make sense."""
 
+import contextlib
 import csv
+import io
 import json
 import shutil
 import subprocess
@@ -63,7 +65,9 @@ def check_files(folder: Path, report: Report) -> None:
 
 def quick(name: str, folder: Path) -> Report:
     seen = []
-    report = run(name, quick=True, output=folder / name, progress=lambda done, total, what: seen.append((done, total)))
+    report = run(
+        name, repeats=1, quick=True, output=folder / name, progress=lambda done, total, what: seen.append((done, total))
+    )
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert seen[-1][0] == seen[-1][1]
     check_files(folder / name, report)
@@ -192,8 +196,25 @@ print(own_peak() - before)
     assert 310 < float(done.stdout) < 350
 
 
-def test_moving_scene(tmp_path):
-    report = quick("moving-scene", tmp_path)
+@pytest.fixture(scope="module")
+def commanded(tmp_path_factory):
+    """What `mpcam experiment` gives and prints of a whole experiment: its files, its report, and its JSON."""
+    folder, kept = tmp_path_factory.mktemp("commanded") / "out", []
+
+    def kept_too(*arguments, **settings):
+        kept.append(run(*arguments, **settings))
+        return kept[-1]
+
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(mpcam.experiments, "run", kept_too)
+        assert main(["experiment", "moving-scene", "--quick", "--repeats", "1", "--output", str(folder), "--json"]) == 0
+    (report,) = kept
+    return folder, report, json.loads(printed.getvalue())
+
+
+def test_moving_scene(commanded):
+    _, report, _ = commanded
     rows = report.table("moving_scene").rows
     assert [row["scene"] for row in rows] == ["sphere 80", "sphere 1280", "facade"]
     for row in rows:
@@ -261,13 +282,11 @@ def test_the_command_lists_the_experiments(capsys):
     assert [entry["name"] for entry in json.loads(capsys.readouterr().out)] == list(EXPERIMENTS)
 
 
-def test_the_command_runs_and_writes(tmp_path, capsys):
-    folder = tmp_path / "out"
-    assert main(["experiment", "moving-scene", "--quick", "--repeats", "1", "--output", str(folder), "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+def test_the_command_runs_and_writes(commanded):
+    folder, report, answer = commanded
     assert answer["experiment"] == "moving-scene" and len(answer["tables"]["moving_scene"]["rows"]) == 3
     assert answer["measured"]["rounds"].startswith("1 timed rounds")
-    check_files(folder, run("moving-scene", quick=True, repeats=1))
+    check_files(folder, report)
 
 
 def test_the_command_prints(monkeypatch, capsys):

@@ -12,6 +12,7 @@ from catalog import POSE
 from graph_cameras import clipped_image, on_pieces, random_graph
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.graph_images import ROWS
 
 CAMERAS: dict[str, Any] = mp.GraphCamera.examples(64, 48, POSE)  # pyright: ignore[reportAssignmentType]
@@ -212,7 +213,7 @@ def test_faces_of_one_frustum_leave_no_gap():
     """Rays exactly along the edge that two faces have in common, in both precisions."""
     camera = mp.GraphCamera.around((0.0, 0.0, 2.0), mp.Pinhole(65, 49), 0.7)
     pixel = np.stack([np.full(49, 32.5), np.arange(49) + 0.5], 1)
-    for rays in (camera.ray_pieces(pixel), camera.ray_pieces(device.Array2f(*pixel.T.astype(np.float32)))):
+    for rays in (camera.ray_pieces(pixel), camera.ray_pieces(device.Array2f(*map(aligned, pixel.T)))):
         valid = rays.valid[1].numpy() if isinstance(rays.valid, tuple) else rays.valid[:, 1]
         assert valid.all()
 
@@ -238,7 +239,7 @@ def test_kernels_and_jax_agree(camera):
         assert (np.abs(place - pixel).max(-1) < 64 * eps * magnified).all()
         assert np.abs(length - depth).max() < 64 * eps * max(1.0, depth.max())
     few = pixel[::7]
-    pieces, exact = camera.ray_pieces(device.Array2f(*few.T.astype(np.float32))), camera.ray_pieces(few)
+    pieces, exact = camera.ray_pieces(device.Array2f(*map(aligned, few.T))), camera.ray_pieces(few)
     for level in range(camera.pieces_per_ray):
         same = pieces.valid[level].numpy() & exact.valid[:, level]
         assert (pieces.valid[level].numpy() == exact.valid[:, level]).mean() > 0.99

@@ -10,19 +10,23 @@ from tools.rooms import ROOMS, SOURCES, arrows, circles, modules, room_of, upwar
 
 MOST_LINES, MEDIAN_LINES = 400, 160
 FILES = modules(SOURCES)
-ARROWS = arrows(FILES)
+
+
+@pytest.fixture(scope="module")
+def all_arrows():
+    return arrows(FILES)
 
 
 def lines(path: Path) -> int:
     return len(path.read_text(encoding="utf-8").splitlines())
 
 
-def test_no_circle_of_files():
-    assert circles(ARROWS) == []
+def test_no_circle_of_files(all_arrows):
+    assert circles(all_arrows) == []
 
 
-def test_no_arrow_up_between_rooms():
-    assert upward(ARROWS) == []
+def test_no_arrow_up_between_rooms(all_arrows):
+    assert upward(all_arrows) == []
 
 
 def test_every_file_has_a_room_and_every_room_files():
@@ -30,8 +34,8 @@ def test_every_file_has_a_room_and_every_room_files():
     assert len(FILES) > 200
 
 
-def test_kernels_know_nothing_of_mpcam():
-    kernels = {name: others for name, others in ARROWS.items() if name.startswith("mpcam_kernels")}
+def test_kernels_know_nothing_of_mpcam(all_arrows):
+    kernels = {name: others for name, others in all_arrows.items() if name.startswith("mpcam_kernels")}
     assert all(other.startswith("mpcam_kernels") for others in kernels.values() for other in others)
 
 

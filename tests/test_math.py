@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mpcam import math as m
+from mpcam.backend import aligned
 
 X = np.linspace(-0.9, 0.9, 19)
 
@@ -18,7 +19,7 @@ def test_elementwise_functions_agree_with_fifty_digits(name):
     exact = np.array([float(getattr(mpmath, {"absolute": "fabs"}.get(name, name))(mpmath.mpf(float(x)))) for x in X])
     assert np.abs(function(X) - exact).max() < 1e-15
     assert np.abs(np.asarray(function(jnp.asarray(X, jnp.float32))) - exact).max() < 1e-6
-    assert np.abs(function(types.Float(X.astype(np.float32))).numpy() - exact).max() < 1e-6
+    assert np.abs(function(types.Float(aligned(X))).numpy() - exact).max() < 1e-6
 
 
 def test_vectors_agree_across_libraries():
@@ -27,7 +28,7 @@ def test_vectors_agree_across_libraries():
     expected = np.cross(a.T, b.T).T
     assert np.allclose(m.cross(a, b), expected, atol=1e-15)
     assert np.allclose(m.cross(jnp.asarray(a), jnp.asarray(b)), expected, atol=1e-5)
-    device = m.cross(types.Array3f(*a.astype(np.float32)), types.Array3f(*b.astype(np.float32)))
+    device = m.cross(types.Array3f(*map(aligned, a)), types.Array3f(*map(aligned, b)))
     assert isinstance(device, types.Array3f)
     assert np.allclose(device.numpy(), expected, atol=1e-5)
     assert isinstance(m.vector(types.Float64(1.0), 2.0), types.Array2f64)
@@ -56,7 +57,7 @@ def test_inverse_of_an_increasing_function():
     found = m.invert_increasing(cubic, slope, cubic(x), 0.0, 2.0)
     assert np.abs(found - x).max() < 1e-14
     assert np.allclose(m.invert_increasing(cubic, slope, np.array([-1.0, 99.0]), 0.0, 2.0), [0, 2])
-    device = m.invert_increasing(cubic, slope, types.Float(cubic(x).astype(np.float32)), 0.0, 2.0)
+    device = m.invert_increasing(cubic, slope, types.Float(aligned(cubic(x))), 0.0, 2.0)
     assert np.abs(device.numpy() - x).max() < 2e-6
 
 

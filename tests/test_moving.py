@@ -1,5 +1,7 @@
 """Scenes that move: each frame is that of the moved scene rendered anew, to the bit."""
 
+import functools
+
 import numpy as np
 import pytest
 from ray_fields import soup
@@ -36,6 +38,7 @@ def scene(seed):
     return mp.Scene((ball, soup(60, seed, 0.4), blob), lights=LIGHTS, background=(0.1, 0.2, 0.3))
 
 
+@functools.cache
 def cameras():
     pose = mp.look_at((0.1, -2.4, 0.7), (0, 0, 0))
     sphere, eye = mp.builtin_mesh("sphere", triangles=80), (0.2, -3.0, 0.5)

@@ -10,7 +10,7 @@ import pycolmap
 import pytest
 
 import mpcam as mp
-from mpcam.backend import types
+from mpcam.backend import aligned, types
 from mpcam.cameras.change import resized
 from mpcam.rendering.device_camera import unposed
 from mpcam.stress import panorama as stress
@@ -33,7 +33,7 @@ def lens(camera) -> Any:
 def on_device(camera, points):
     """Pixel and validity of points (N, 3) in single precision, with the camera's numbers on the device."""
     t = types()
-    image = lens(camera).local_project(t.Array3f(*points.T.astype(np.float32)))[0]
+    image = lens(camera).local_project(t.Array3f(*map(aligned, points.T)))[0]
     return image.pixel.numpy().T, image.valid.numpy()
 
 
@@ -66,7 +66,7 @@ def test_every_pixel_has_one_ray_and_every_direction_one_pixel(turn):
     back = camera.project(7 * ray.direction)
     assert back.valid.all() and np.abs(back.pixel[:, 0] - pixels).max() < 1e-9
     t = types()
-    single = lens(camera).local_ray(t.Array2f(*pixels.T.astype(np.float32)))
+    single = lens(camera).local_ray(t.Array2f(*map(aligned, pixels.T)))
     assert np.all(single.valid)
     pixel, valid = on_device(camera, single.direction.numpy().T)
     assert valid.all() and np.array_equal(np.floor(pixel), np.floor(pixels))

@@ -14,6 +14,7 @@ from catalog import POSE, registered, soup
 from ray_fields import wrong_pixels
 
 import mpcam as mp
+from mpcam.backend import aligned
 from mpcam.cameras.serialize import camera_from_json, camera_to_json
 from mpcam.io.cameras import load_camera
 from mpcam.stress import ray_map as stress
@@ -49,7 +50,7 @@ def test_at_the_centers_the_rays_are_the_given_ones_to_the_bit():
     assert ray.valid.all() and np.array_equal(ray.origin, origins)
     unit = np.moveaxis(mp.math.normalize(np.moveaxis(directions, -1, 0)), 0, -1)
     assert np.array_equal(ray.direction, unit)
-    found = camera.ray(device.Array2f(*centers(camera).reshape(-1, 2).T.astype(np.float32)))
+    found = camera.ray(device.Array2f(*map(aligned, centers(camera).reshape(-1, 2).T)))
     assert np.array_equal(found.origin.numpy().T, origins.reshape(-1, 3).astype(np.float32))
 
 
@@ -198,7 +199,7 @@ def test_scale_does_not_matter(scale):
     here, there = camera.project(points), other.project(scale * points)
     assert np.array_equal(here.valid, there.valid) and here.valid.any()
     assert np.abs(here.pixel - there.pixel).max() < 1e-11
-    single = other.project(device.Array3f(*(scale * points).T.astype(np.float32)))
+    single = other.project(device.Array3f(*map(aligned, (scale * points).T)))
     assert np.abs(single.pixel[0].numpy().T - here.pixel[:, 0]).max() < 1e-4
 
 

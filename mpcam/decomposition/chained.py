@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, types
+from mpcam.backend import aligned, exclusive, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.errors import InputError
 
@@ -154,8 +154,8 @@ class Chained:
         import drjit as dr
 
         t, (pixel, weights, used) = types(), self._taps
-        number = [t.UInt(np.ascontiguousarray(pixel[:, k], np.uint32)) for k in range(3)]
-        parts = [t.Float(np.ascontiguousarray(weights[:, k] * used, np.float32)) for k in range(3)]
+        number = [t.UInt(aligned(pixel[:, k], np.uint32)) for k in range(3)]
+        parts = [t.Float(aligned(weights[:, k] * used)) for k in range(3)]
         dr.make_opaque(number, parts)
         return number, parts
 

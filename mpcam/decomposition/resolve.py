@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.checks import shown
@@ -81,7 +81,7 @@ class Resolver:
         def spread(values: np.ndarray, kind: Any, other: Any, rest: float) -> Any:
             whole = np.full(count, rest, other)
             whole[lanes] = values
-            return kind(whole) + kind(opaque_zero())
+            return kind(aligned(whole, other)) + kind(opaque_zero())
 
         result = {
             "first": spread(first, t.Int, np.int32, -1),
@@ -113,10 +113,10 @@ class Resolver:
             raise InputError(f"background has shape {behind.shape}: give one number, {channels}, or a picture {shape}")
         t = types()
         if behind.ndim == 3:
-            back = [t.Float(np.ascontiguousarray(behind[..., c]).ravel()) + opaque_zero() for c in range(channels)]
+            back = [t.Float(aligned(behind[..., c])) + opaque_zero() for c in range(channels)]
         else:
             back = opaque_numbers([float(value) for value in np.broadcast_to(behind, channels)])
-        color = self.on_device(t.Float(atlas.ravel()) + opaque_zero(), back)
+        color = self.on_device(t.Float(aligned(atlas)) + opaque_zero(), back)
         return np.stack([np.asarray(part.numpy()) for part in color], axis=-1).reshape(shape)
 
     @exclusive

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_zero, types
+from mpcam.backend import aligned, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Bends, need
 from mpcam.rendering.device_camera import device_camera
@@ -23,7 +23,7 @@ def piece_rows(camera: Camera) -> tuple[Any, ...] | None:
         return None
     kept = device_camera(camera).kept
     if "pieces" not in kept:
-        kept["pieces"] = tuple(types().Float(rows.ravel()) + opaque_zero() for rows in _rows(camera))
+        kept["pieces"] = tuple(types().Float(aligned(rows)) + opaque_zero() for rows in _rows(camera))
     return kept["pieces"]
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import HasRays, Projects, need
 from mpcam.depth_images.intersections import Intersections
@@ -309,4 +309,4 @@ def _vectors(name: str, values: Any, shape: tuple[int, ...]) -> Any:
 
 
 def _upload(values: np.ndarray) -> Any:
-    return types().Float(np.ascontiguousarray(values, np.float32).ravel()) + opaque_zero()
+    return types().Float(aligned(values)) + opaque_zero()

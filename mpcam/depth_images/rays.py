@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_zero, types
+from mpcam.backend import aligned, opaque_zero, types
 from mpcam.cameras.types import PosedRays, Ray
 from mpcam.checks import is_number, shown, vectors
 from mpcam.errors import InputError
@@ -72,7 +72,7 @@ def far_of(far: Any, shape: tuple[int, ...]) -> Any:
     """Lengths beyond which nothing counts, on the device; raises InputError for other shapes and for what is NaN."""
     t = types()
     if far is None:
-        return t.Float(np.full(1, np.inf, np.float32)) + opaque_zero()
+        return t.Float(aligned(np.inf)) + opaque_zero()
     if library(far) == "drjit":
         return t.Float(far)
     try:
@@ -82,7 +82,7 @@ def far_of(far: Any, shape: tuple[int, ...]) -> Any:
         raise InputError(f"far={shown(far)}: give a length, or one for each ray, shape {shape}") from None
     if np.isnan(flat).any():
         raise InputError("far: lengths are needed, and some are NaN")
-    return t.Float(np.ascontiguousarray(flat, np.float32)) + opaque_zero()
+    return t.Float(aligned(flat)) + opaque_zero()
 
 
 def _device_vectors(name: str, value: Any) -> Any:

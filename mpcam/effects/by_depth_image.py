@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.cameras.types import Ray
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.depth_images.depth_image import DepthImage
@@ -49,7 +49,7 @@ class ByDepthImages:
         self.posed = world_rays(self.ray)
         place = np.full(len(ray.valid), -1, np.int32)
         place[valid] = np.arange(len(valid))
-        self._place = types().Int(place) + types().Int(opaque_zero())
+        self._place = types().Int(aligned(place, np.int32)) + types().Int(opaque_zero())
         self.shown = self._all_shown(scene)
         self.own = own_images(mirror, eye, choice.size, choice.aside) if choice.own else []
         self._tint, self._background = opaque_numbers(list(mirror.color)), opaque_numbers(list(scene.background))
@@ -104,9 +104,7 @@ class ByDepthImages:
         on_device = None if environment is None else environment.on_device
         mirrors = [MIRROR] * len(self.own)
         parts = [0.0] * len(self.choice.given) + [s.reflectance for s in self.shown for _ in s.images] + mirrors
-        around = Surroundings(
-            t.Float(np.array(parts or [0.0], np.float32)) + opaque_zero(), self._tint, self._background, on_device
-        )
+        around = Surroundings(t.Float(aligned(parts or [0.0])) + opaque_zero(), self._tint, self._background, on_device)
         count = dr.width(self.posed.ray.valid)
         light, through = dr.zeros(t.Array3f, count), dr.full(t.Array3f, 1.0, count)
         if not images:

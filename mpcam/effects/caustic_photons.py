@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.pinhole import Pinhole
@@ -65,9 +65,9 @@ class Photons:
             return t.Array3f(np.ascontiguousarray(vectors.reshape(-1, 3).T, np.float32)) + zero
 
         rays = {
-            "texels": [t.Int(self.texels[..., k].astype(np.int32).ravel()) + t.Int(zero) for k in range(4)],
-            "flux": t.Float(self.flux.astype(np.float32).ravel()) + zero,
-            "reach": t.Float(self.reach.astype(np.float32).ravel()) + zero,
+            "texels": [t.Int(aligned(self.texels[..., k], np.int32)) + t.Int(zero) for k in range(4)],
+            "flux": t.Float(aligned(self.flux)) + zero,
+            "reach": t.Float(aligned(self.reach)) + zero,
             "origin": columns(start),
             "along": columns(self.direction),
             "unit": opaque_numbers([device.scale])[0],

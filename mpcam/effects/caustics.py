@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.chained import Chained
@@ -107,7 +107,7 @@ class Caustics:
             )
         self.camera = camera
         self._eye: Any = prepare(camera, self.seen_scene.mesh)
-        self._angles = types().Float(pixel_solid_angles(camera).astype(np.float32).ravel()) + opaque_zero()
+        self._angles = types().Float(aligned(pixel_solid_angles(camera))) + opaque_zero()
         self._place_eye()
 
     def _place_eye(self) -> None:
@@ -167,7 +167,7 @@ class Caustics:
     @functools.cached_property
     def _table(self) -> Any:
         """Number of the mesh of each face, on the device."""
-        return types().Int(self._objects) + types().Int(opaque_zero())
+        return types().Int(aligned(self._objects, np.int32)) + types().Int(opaque_zero())
 
     @functools.cached_property
     @exclusive

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras.radial import Radial
 from mpcam.effects.lookup import back_to_back, check_size, four_texels, place
 from mpcam.effects.vectors import as_vector, as_vectors
@@ -87,7 +87,7 @@ class EnvironmentMap:
     def on_device(self) -> DeviceEnvironment:
         """The map in device memory, with a `lookup` for kernels."""
         flat = np.concatenate([np.asarray(image, np.float32).ravel() for image in self.images])
-        return DeviceEnvironment(types().Float(flat) + opaque_zero(), len(self.images[0]))
+        return DeviceEnvironment(types().Float(aligned(flat)) + opaque_zero(), len(self.images[0]))
 
     @exclusive
     def lookup(self, directions: Any) -> np.ndarray:

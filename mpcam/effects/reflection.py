@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
@@ -205,7 +205,7 @@ class Reflection:
     @exclusive
     def distance(self) -> Any:
         """Float on the device: how far the mirror is along each pixel's ray, infinite beside it."""
-        return types().Float(self.rays.distance.astype(np.float32)) + opaque_zero()
+        return types().Float(aligned(self.rays.distance)) + opaque_zero()
 
     @property
     def mask(self) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.depth_images.march import opaque_most, projection
 from mpcam.depth_images.rays import side_for
@@ -112,7 +112,7 @@ def relief_hits(
         back, pose = _poses(matrix, placed.mesh), placed.mesh.pose(matrix)
         order = placed.order(frame_origin(matrix))
         for first in range(0, len(order), CHUNK):
-            chosen = t.UInt(order[first : first + CHUNK]) + t.UInt(opaque_zero())
+            chosen = t.UInt(aligned(order[first : first + CHUNK], np.uint32)) + t.UInt(opaque_zero())
             size = dr.opaque(t.UInt, min(CHUNK, len(order) - first))
             copies = placed.poses, placed.balls, chosen, size
             lists = _lists(rays, pose, copies, min(CHUNK, len(order) - first))
@@ -148,7 +148,7 @@ def _limit(depth: Any, count: int) -> Any:
             raise InputError(
                 f"depth has shape {values.shape}: a length for each of the camera's {count} pixels is needed"
             )
-        depth = t.Float(np.ascontiguousarray(values, np.float32).ravel()) + opaque_zero()
+        depth = t.Float(aligned(values)) + opaque_zero()
     if dr.width(depth) != count:
         raise InputError(
             f"depth holds {dr.width(depth)} lengths: one for each of the camera's {count} pixels is needed"
@@ -261,7 +261,7 @@ def pixels_of(layout: BlockLayout) -> Any:
     pixels = np.full(layout.blocks * PIXELS, -1, np.int32)
     there = np.flatnonzero(layout.slots >= 0)
     pixels[layout.slots[there]] = there % layout.pixels
-    return types().Int(pixels) + types().Int(opaque_zero())
+    return types().Int(aligned(pixels, np.int32)) + types().Int(opaque_zero())
 
 
 @functools.cache

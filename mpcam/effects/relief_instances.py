@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
@@ -103,8 +103,7 @@ class Placed:
 
 
 def _upload(values: np.ndarray) -> Any:
-    flat = np.ascontiguousarray(values, np.float32).ravel()
-    return types().Float(flat) + opaque_zero() if flat.size else types().Float()
+    return types().Float(aligned(values)) + opaque_zero() if values.size else types().Float()
 
 
 def _even(matrices: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.depth_images.depth_image import DepthImage
 from mpcam.rendering.device import device_mesh
 
@@ -31,7 +31,7 @@ def texels_of(image: DepthImage, key: Any, mask: np.ndarray | None) -> Texels:
     flags = None
     if key is not None:
         chosen = np.abs(np.asarray(image.color) - key).max(-1) <= SAME_COLOR if mask is None else mask
-        flags = types().Float(np.ascontiguousarray(chosen, np.float32).ravel()) + opaque_zero()
+        flags = types().Float(aligned(chosen)) + opaque_zero()
     numbers = opaque_numbers([1.0, 1.0, 1.0] if key is None else [*key])
     normals = image.device_normals
     hits = image.hits if normals is not None else None

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_zero, types
+from mpcam.backend import aligned, opaque_zero, types
 from mpcam.cameras.ray_map import RayMap
 from mpcam.cameras.types import Ray
 from mpcam.decomposition.ray_error import bent
@@ -56,7 +56,7 @@ class ByTracedOrders:
         light = np.zeros((len(self.valid), 3))
         if self.valid.any():
             light[self.valid] = self._light()
-        return [types().Float(np.ascontiguousarray(part, np.float32)) + opaque_zero() for part in light.T]
+        return [types().Float(aligned(part)) + opaque_zero() for part in light.T]
 
     def _light(self) -> np.ndarray:
         start, along = self.start, self.along

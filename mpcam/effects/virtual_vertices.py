@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras import three_rays
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
@@ -54,12 +54,12 @@ class VirtualVertices(VertexProjected):
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = pose[:3, :3].T, frame_origin(pose) - self.device.anchor
         table = corner_rays(cams, frame, self.device.scale)
-        self.rays = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel()) + opaque_zero()
+        self.rays = t.Float(aligned(table.transpose(2, 0, 1))) + opaque_zero()
         self.cones = _cones(table)
         with np.errstate(invalid="ignore", over="ignore"):
             places = mesh.corners.mean(axis=1) if self.level else mesh.vertices
         order = nearby(places) if mesh.triangle_count else np.zeros(1)
-        self.order = t.UInt(order.astype(np.uint32)) + t.UInt(opaque_zero())
+        self.order = t.UInt(aligned(order, np.uint32)) + t.UInt(opaque_zero())
         self.points = self.parts.points if self.level else 1
         from mpcam_kernels.candidates import levels
 

@@ -150,9 +150,9 @@ class Unrolled:
     @functools.cached_property
     @exclusive
     def _number(self) -> Any:
-        from mpcam.backend import opaque_zero
+        from mpcam.backend import aligned, opaque_zero
 
-        return types().UInt(self.pixel.ravel()) + types().UInt(opaque_zero())
+        return types().UInt(aligned(self.pixel, np.uint32)) + types().UInt(opaque_zero())
 
     def __call__(self, image: Any) -> np.ndarray:
         """The panorama (height, width, ...) of an image or any other field (H, W, ...) of the atlas."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import types
+from mpcam.backend import aligned, types
 from mpcam.cameras.atlas import Atlas
 from mpcam.geometry.order import interleaved
 from mpcam_kernels.pixels import PER_THREAD
@@ -84,10 +84,8 @@ class BlockLayout:
             "parts": self.parts,
             "runs": self.runs,
         }
-        found: dict[str, Any] = {
-            name: t.UInt(np.ascontiguousarray(values, np.uint32)) for name, values in arrays.items()
-        }
-        found["slots"] = t.Int(self.slots)
+        found: dict[str, Any] = {name: t.UInt(aligned(values, np.uint32)) for name, values in arrays.items()}
+        found["slots"] = t.Int(aligned(self.slots, np.int32))
         found["layers"] = t.UInt([len(self.slots) // self.pixels]), t.UInt([self.pixels])
         found["pixels"] = dr.arange(t.UInt, self.pixels)
         found["threads"] = [dr.arange(t.UInt, n) for n in (self.blocks * PIXELS, self.blocks, self.groups)]

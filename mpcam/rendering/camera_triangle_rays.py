@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, types
+from mpcam.backend import aligned, opaque_numbers, types
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.types import Ray
 from mpcam.math import normalize
@@ -28,7 +28,7 @@ def camera_triangle_rays(camera: CameraTriangles, device: DeviceMesh, planes: bo
     frame = np.eye(4)
     frame[:3, 3] = -anchor
     table = corner_rays(camera, frame, scale)
-    rows = t.Float(np.ascontiguousarray(table.transpose(2, 0, 1), np.float32).ravel())
+    rows = t.Float(aligned(table.transpose(2, 0, 1)))
     bent: dict[str, Any] = {}
     if camera.directions is None:
         bent["eye"] = opaque_numbers(list((np.asarray(camera.eye, np.float64) - anchor) / scale))
@@ -72,7 +72,7 @@ def _sides(atlas: Any) -> Any:
     """Pixels along the short sides of each camera triangle, on the device."""
     import drjit as dr
 
-    sides = types().UInt(np.ascontiguousarray(atlas.sides, np.uint32))
+    sides = types().UInt(aligned(atlas.sides, np.uint32))
     dr.make_opaque(sides)
     return sides
 
@@ -95,11 +95,11 @@ def _planes(camera: CameraTriangles, anchor: np.ndarray, scale: float, layout: B
     maps[:, 2] /= scale
 
     def flat(values: np.ndarray) -> Any:
-        return t.Float(np.ascontiguousarray(values, np.float32).ravel())
+        return t.Float(aligned(values))
 
     slopes = [flat(found.slopes[:, k] * scale) for k in range(found.slopes.shape[1])]
     counts = np.bincount(layout.face, minlength=camera.count)
-    first, count = (t.UInt(values.astype(np.uint32)) for values in (np.cumsum(counts) - counts, counts))
+    first, count = (t.UInt(aligned(values, np.uint32)) for values in (np.cumsum(counts) - counts, counts))
     around = room(t, Cones.ROWS, camera.count)
     around.store(cones.joined(t, first, count), threads(t, 0, camera.count))
     planes = Planes(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, aligned_room, opaque_numbers, opaque_zero, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import MovedMesh
@@ -34,7 +34,7 @@ class DeviceMesh:
         self.used = _used(mesh) if self.base is None else self.base.used
         self.anchor, self.scale, self.reaches_far = (*frame, True) if frame else _frame(self.used_of(mesh))
         if self.base is None:
-            self.faces = t.UInt(np.ascontiguousarray(mesh.faces.ravel(), np.uint32))
+            self.faces = t.UInt(aligned(mesh.faces, np.uint32))
         else:
             self.faces = self.base.faces
         self.vertices = in_frame(mesh.vertices, self.anchor, self.scale)
@@ -78,7 +78,7 @@ class DeviceMesh:
             with np.errstate(invalid="ignore", over="ignore"):
                 order = nearby(mesh.corners.mean(axis=1)) if mesh.triangle_count else np.zeros(0, np.int64)
             faces = np.ascontiguousarray(mesh.faces[order].ravel(), np.uint32)
-            self._ordered = types().UInt(order.astype(np.uint32)), types().UInt(faces)
+            self._ordered = types().UInt(aligned(order, np.uint32)), types().UInt(aligned(faces, np.uint32))
         return self._ordered
 
     def pose(self, frame_from_world: Any) -> list[Any]:
@@ -103,7 +103,7 @@ def in_frame(vertices: np.ndarray, anchor: np.ndarray, scale: float) -> Any:
 def _around(vertices: np.ndarray, anchor: np.ndarray, scale: float) -> np.ndarray:
     """(vertices - anchor) / scale in float32, flat."""
     together, rest = _rows_together(vertices)
-    result = np.empty(vertices.size, np.float32)
+    result = aligned_room(vertices.size)
     cut = together.size
     moved = together - np.tile(anchor, _TOGETHER)
     moved /= scale

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Bends, HasKernels
 from mpcam.cameras.profiles import Profile
@@ -218,4 +218,4 @@ def world_rays(rays: Ray) -> PosedRays:
     origin = np.where(valid[:, None], origin + pose[:3, 3], 0.0)
     columns = (np.ascontiguousarray(x.T, np.float32) for x in (origin, direction))
     start, along = (t.Array3f(x) + opaque_zero() for x in columns)
-    return PosedRays(pose, Ray(start, along, t.Bool(valid) & (opaque_zero() == 0)))
+    return PosedRays(pose, Ray(start, along, t.Bool(aligned(valid, bool)) & (opaque_zero() == 0)))

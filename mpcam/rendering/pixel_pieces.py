@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_zero, types
+from mpcam.backend import aligned, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Bends, need
 from mpcam.cameras.types import RayPieces
@@ -65,7 +65,7 @@ def pixel_pieces(camera: Camera) -> PixelPieces:
     table = np.zeros((layout.blocks * PIXELS, 4 * Rays.ROWS), np.float32)
     for number, (which, rows) in enumerate(layers):
         table[layout.slots[number * count + which]] = rows.T
-    return PixelPieces(layout, anchor, Rays(Rows(types().Float(table.ravel()) + opaque_zero(), Rays.ROWS)))
+    return PixelPieces(layout, anchor, Rays(Rows(types().Float(aligned(table)) + opaque_zero(), Rays.ROWS)))
 
 
 def _layout(width: int, height: int, layers: Sequence[Any]) -> BlockLayout:

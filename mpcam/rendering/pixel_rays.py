@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpcam.backend import opaque_zero, types
+from mpcam.backend import aligned, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import HasRays, need
 from mpcam.cameras.types import Ray
@@ -76,4 +76,4 @@ def _uploaded(ray: Ray, camera: Camera) -> tuple[Ray, np.ndarray]:
     anchor = 0.5 * some.min(axis=1) + 0.5 * some.max(axis=1) if valid.any() else np.zeros(3)
     parts = (np.where(valid, origin - anchor[:, None], 0.0), np.where(valid, direction, 0.0))
     origin, direction = (t.Array3f(np.ascontiguousarray(part, np.float32)) + opaque_zero() for part in parts)
-    return Ray(origin, direction, t.Bool(np.ascontiguousarray(valid)) & (opaque_zero() == 0)), anchor
+    return Ray(origin, direction, t.Bool(aligned(valid, bool)) & (opaque_zero() == 0)), anchor

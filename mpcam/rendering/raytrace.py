@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.cameras.capabilities import Bends
@@ -97,7 +97,7 @@ class RayTraced(Moving):
         mesh, self._unit = self.mesh, self.device.scale
         with np.errstate(invalid="ignore", over="ignore"):
             finite = np.isfinite(mesh.corners).all(axis=(1, 2))
-        self._kept = None if finite.all() else types().UInt(np.flatnonzero(finite).astype(np.uint32))
+        self._kept = None if finite.all() else types().UInt(aligned(np.flatnonzero(finite), np.uint32))
         faces = mesh.faces if self._kept is None else mesh.faces[finite]
         self._scene: Any = None
         self._parameters: Any = None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import MovedMesh
@@ -31,7 +31,7 @@ class Attributes:
 
     @functools.cached_property
     def faces(self) -> Any:
-        return types().UInt(self._faces.ravel().astype(np.uint32))
+        return types().UInt(aligned(self._faces, np.uint32))
 
     @functools.cached_property
     def uv(self) -> Any:
@@ -44,7 +44,7 @@ class Attributes:
     @functools.cached_property
     def material(self) -> Any:
         numbers = np.zeros(len(self._faces), np.uint32) if self._face_material is None else self._face_material
-        return types().UInt(numbers.astype(np.uint32))
+        return types().UInt(aligned(numbers, np.uint32))
 
     @functools.cached_property
     def base(self) -> Any:
@@ -63,11 +63,11 @@ class Attributes:
             table.append((start, width, height))
             texels.append(material.texture.reshape(-1, 3))
             start += width * height
-        return _upload(np.concatenate(texels)), types().UInt(np.array(table, np.uint32).ravel())
+        return _upload(np.concatenate(texels)), types().UInt(aligned(table, np.uint32))
 
 
 def _upload(values: Any) -> Any:
-    return types().Float(np.ascontiguousarray(values, np.float32).ravel())
+    return types().Float(aligned(values))
 
 
 _attributes: weakref.WeakKeyDictionary[Mesh, Attributes] = weakref.WeakKeyDictionary()
@@ -137,7 +137,7 @@ def _on_device(exposure: Any, hits: Hits, shading: str) -> Any:
         raise InputError(
             f"exposure has shape {values.shape} and type {values.dtype}: floats of shape {shape} are needed"
         )
-    return t.Float(np.ascontiguousarray(values, np.float32).ravel()) + opaque_zero()
+    return t.Float(aligned(values)) + opaque_zero()
 
 
 def check_shadow_shading(shading: str) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.types import PosedRays
 
@@ -47,8 +47,8 @@ def bent_rays(mi: Any, camera: Camera, origin: np.ndarray, unit: float) -> list[
     zero, found = mi.Float(opaque_zero()), []
     for table in _tables(camera, origin, unit):
         start, way = (mi.Vector3f(table[rows]) + zero for rows in (slice(0, 3), slice(3, 6)))
-        most = mi.Float(np.ascontiguousarray(table[6])) + zero
-        before = types().Float(np.ascontiguousarray(table[7])) + opaque_zero()
+        most = mi.Float(aligned(table[6])) + zero
+        before = types().Float(aligned(table[7])) + opaque_zero()
         ray = mi.Ray3f(mi.Point3f(start), way, most, mi.Float(0), [])
         found.append(TracedRays(ray, most > 0, before))
         dr.eval(ray, found[-1].valid, before)

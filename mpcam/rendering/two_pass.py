@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.linear_pieces import LinearPieces, linear_pieces
 from mpcam.checks import whole_number
@@ -232,7 +232,7 @@ def _named(planar: Any, owner: np.ndarray, width: int, height: int) -> Any:
 
 def _uploaded(table: np.ndarray) -> Any:
     """A table (N,) in Dr.Jit's own memory, as frozen kernels want it."""
-    return types().Float(np.ascontiguousarray(table, np.float32)) + opaque_zero()
+    return types().Float(aligned(table)) + opaque_zero()
 
 
 def opaque_whole(number: int) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mpcam.backend import exclusive, types
+from mpcam.backend import aligned, exclusive, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.capabilities import Images, Projects, need
 from mpcam.checks import whole_number
@@ -156,7 +156,7 @@ class Subdivision:
         t = types()
         self.count, self.points = len(parts), len(rows)
         self.grid = t.Array2f(np.array([((r - c) / divisions, c / divisions) for r, c in rows], np.float32).T)
-        self._pattern = t.UInt(np.array(parts, np.uint32).ravel())
+        self._pattern = t.UInt(aligned(parts, np.uint32))
 
     def faces(self, faces: Any, triangles: int) -> Any:
         """Vertex numbers of all parts of all triangles."""

@@ -59,18 +59,18 @@ def _missed(camera: Any, corners: np.ndarray, bounds: dict[str, BoundOf]) -> dic
     """How many triangles have a sampled point, along the edges or inside, that a bound leaves out."""
     import drjit as dr
 
-    from mpcam.backend import opaque_zero, types
+    from mpcam.backend import aligned, opaque_zero, types
     from mpcam.rendering.device_camera import unposed
 
     t, lens = types(), unposed(camera)
     # In Dr.Jit's own memory, so that the kernel is compiled once.
-    single = [t.Array3f(*np.ascontiguousarray(corners[:, i].T)) + opaque_zero() for i in range(3)]
+    single = [t.Array3f(*map(aligned, corners[:, i].T)) + opaque_zero() for i in range(3)]
     size = max(camera.width, camera.height)
     regions = {kind: [_Region(t, region, size) for region in bound(lens, *single)] for kind, bound in bounds.items()}
     exact = [t.Array3f64(corner) for corner in single]
     dr.eval(single, [region.arrays for several in regions.values() for region in several])
     weights = np.array(_weights()).T
-    tables = [t.Float64(np.ascontiguousarray(row)) for row in weights]
+    tables = [t.Float64(aligned(row, np.float64)) for row in weights]
 
     def sample(number: Any, *out: Any) -> tuple[Any, ...]:
         w = [dr.gather(t.Float64, table, number) for table in tables]
