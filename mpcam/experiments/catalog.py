@@ -100,5 +100,15 @@ EXPERIMENTS = {
             "rosen2011_fig1",
             "Rosen et al. 2011, Figs. 1, 11, 15: what depth images lack in a mirror, by camera; errors and times",
         ),
+        Experiment(
+            "fit-error-vs-triangles",
+            "fit_error_vs_triangles",
+            "Rays of uniform, simplified and fitted camera triangles, 16 to 2,048 of them, on eight reflectors",
+        ),
+        Experiment(
+            "fit-hou2006-fig6",
+            "fit_hou2006_fig6",
+            "The mirrors of Hou et al. 2006, Fig. 6, by fitted camera triangles: pictures as good with how many fewer",
+        ),
     )
 }
