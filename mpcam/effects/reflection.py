@@ -5,12 +5,12 @@ rays traced from the true surface.
 """
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Unpack
 
 import numpy as np
 
-from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
+from mpcam.backend import exclusive
 from mpcam.cameras.base import Camera
 from mpcam.cameras.camera_triangles import CameraTriangles
 from mpcam.decomposition.decompose import decompose
@@ -20,19 +20,17 @@ from mpcam.effects.lookup import check_size
 from mpcam.effects.mirror_methods import MIRROR_METHODS, MirrorSettings
 from mpcam.effects.mirror_parts import ByEnvironment, ByTracing, ByTriangles, ByVertices, MirrorPart, explained
 from mpcam.effects.mirror_rays import MirrorRays, mirror_rays
+from mpcam.effects.surface_picture import SurfacePicture
 from mpcam.effects.traced_orders import ByTracedOrders
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
-from mpcam.geometry.moved import moved
-from mpcam.rendering.explanation import Explanation, Step
+from mpcam.rendering.explanation import Step
 from mpcam.rendering.hits import Hits
-from mpcam.rendering.methods import prepare
-from mpcam.rendering.shade import check_shading, check_shadows, shade_device, vertex_normals
 from mpcam.scene.mirror import Mirror
 from mpcam.scene.scene import Scene
 
 
-class Reflection:
+class Reflection(SurfacePicture):
     """Frames of a scene with a mirror; everything that does not change with the scene's vertices is made here.
 
     scene: its meshes are seen in the mirror and beside it. mirror: default the scene's. camera: with a common center;
@@ -61,37 +59,14 @@ class Reflection:
         shadows: Sequence[Any] = (),
         **settings: Unpack[MirrorSettings],
     ):
-        self.scene, self.method, self.shading, self.shadows = scene, method, shading, shadows
-        given = camera if camera is not None else scene.camera
         found = mirror if mirror is not None else scene.mirror
         if found is None:
             raise InputError(f"scene {scene.name!r} has no mirror: give it one, mpcam.Mirror(surface), or pass mirror=")
         if not isinstance(found, Mirror):
             raise InputError(f"mirror is a {type(found).__name__}: give mpcam.Mirror(surface)")
-        if not isinstance(given, Camera) or given.ray_geometry != "central":
-            raise InputError("a camera with a common center is needed to look into a mirror: give one as camera=")
-        check_shading(shading)
-        check_shadows(shadows, scene, shading)
-        self.camera, self.mirror = given, found
-        if method not in MIRROR_METHODS:
-            raise InputError(f"method={method!r}: allowed are {', '.join(MIRROR_METHODS)}")
-        self._settings = self._checked(dict(settings))
-        self.direct: Any = prepare(given, scene.mesh)
+        super().__init__(scene, camera, method, shading, shadows, MIRROR_METHODS, settings, "mirror")
+        self.mirror = found
         self.part = self._part()
-        self._color = opaque_numbers(list(found.color))
-
-    def _checked(self, settings: dict[str, Any]) -> dict[str, Any]:
-        """Those that are not None; raises InputError for those that do not go with the method."""
-        names = {one: entry.home(self.camera).names for one, entry in MIRROR_METHODS.items()}
-        kept = {name: value for name, value in settings.items() if value is not None or name == "coarse"}
-        for name in kept:
-            if name not in names[self.method]:
-                fitting = " or ".join(repr(one) for one in names if name in names[one])
-                if not fitting:
-                    allowed = ", ".join(names[self.method]) or "none"
-                    raise InputError(f"method={self.method!r} has no setting {name!r}: allowed are {allowed}")
-                raise InputError(f"{name}= goes with method={fitting}, not with {self.method!r}")
-        return kept
 
     def _part(self) -> MirrorPart:
         """What the method shows in the mirror."""
@@ -129,53 +104,6 @@ class Reflection:
         own = {"bounces": mirror.bounces, "reflectance": mirror.reflectance, "own": mirror.own}
         return choice_of(self.scene, **(own | dict(mirror.depth_images or {}) | self._settings))
 
-    @exclusive
-    def update(
-        self,
-        vertices: Any = None,
-        *,
-        normals: Any = None,
-        transform: Any = None,
-        shadows: Sequence[Any] | None = None,
-    ) -> None:
-        """The scene elsewhere: positions (V, 3) of all its vertices or a list with one array for each of its meshes,
-        or a rigid transform; see `Moving.update`. The mirror and its camera triangles stay. shadows: the shadow maps as
-        they are now, of a picture with shadows; they do not move by themselves. Raises InputError for other shapes,
-        where shading needs normals that are not known, and for shadows that are missing or none of this picture.
-        """
-        if shadows is None and self.shadows:
-            raise InputError(
-                "this picture has shadow maps, which do not move with the scene: pass shadows=, the maps as they are "
-                "now (see mpcam.shadow_map), or the same ones where they are to stay"
-            )
-        if shadows is not None:
-            check_shadows(shadows, self.scene, self.shading)
-            self.shadows = shadows
-        mesh = moved(self.scene.mesh, vertices, normals, transform)
-        if self.shading in ("light", "normal"):
-            vertex_normals(mesh)
-        self.direct.move(mesh)
-        self.part.move(mesh)
-
-    @exclusive
-    def frame(self) -> Any:
-        """One frame on the device: an evaluated Array3f, one entry per pixel."""
-        hits = self.direct.frame()
-        beside = self.shaded(hits)
-        return _over(hits.device_depth, beside, self.distance, self.part.colors(), self._color)
-
-    def shaded(self, hits: Hits, shading: str | None = None) -> Any:
-        """Colors of hits on the scene, on the device; shading: another than the picture's."""
-        if shading not in (None, self.shading):
-            return shade_device(hits, self.scene, shading)
-        return shade_device(hits, self.scene, self.shading, self.shadows)
-
-    @exclusive
-    def image(self) -> np.ndarray:
-        """One frame: (H, W, 3) float32, linear RGB."""
-        shape = (self.camera.height, self.camera.width, 3)
-        return np.stack([np.asarray(part.numpy()) for part in self.frame()], -1).reshape(shape)
-
     @property
     def cams(self) -> CameraTriangles | None:
         """The camera triangles that stand for the mirror; None for other methods."""
@@ -189,48 +117,16 @@ class Reflection:
         return self.part.prepared.frame()
 
     @property
-    def explanation(self) -> Explanation:
-        """Which stages a frame takes, which are left out, and why."""
-        direct = Step("direct view", True, f"{self.scene.mesh.triangle_count:,} scene triangles beside the mirror")
-        lost = self.scene.environment is not None
-        missing = Step("rays that miss", lost, "see the scene's environment" if lost else "see the background")
-        return Explanation((direct, *explained(self.part, self.method), missing))
+    def tint(self) -> tuple[float, float, float]:
+        return self.mirror.color
+
+    def _steps(self) -> Iterator[Step]:
+        return explained(self.part, self.method)
 
     @functools.cached_property
     def rays(self) -> MirrorRays:
         """The rays that the true surface sends on."""
         return mirror_rays(self.camera, self.mirror)
-
-    @functools.cached_property
-    @exclusive
-    def distance(self) -> Any:
-        """Float on the device: how far the mirror is along each pixel's ray, infinite beside it."""
-        return types().Float(aligned(self.rays.distance)) + opaque_zero()
-
-    @property
-    def mask(self) -> np.ndarray:
-        """(H, W) bool: pixels that see the mirror, unless something stands before it."""
-        return np.isfinite(self.rays.distance).reshape(self.camera.height, self.camera.width)
-
-
-def _over(depth: Any, beside: Any, distance: Any, colors: list[Any], color: list[Any]) -> Any:
-    """The mirror's colors where it is nearer than the rest."""
-    return _over_kernel()(depth, beside, distance, colors, color)
-
-
-@functools.cache
-def _over_kernel() -> Any:
-    import drjit as dr
-
-    from mpcam_kernels.frozen import frozen
-
-    @frozen
-    def over(depth: Any, beside: Any, distance: Any, colors: list[Any], color: list[Any]) -> Any:
-        t = types()
-        seen = t.Array3f(*(part * tint for part, tint in zip(colors, color, strict=True)))
-        return dr.select(distance < depth, seen, t.Array3f(beside))
-
-    return over
 
 
 def reflection(scene: Scene, camera: Camera | None = None, mirror: Mirror | None = None, **settings: Any) -> np.ndarray:

@@ -24,7 +24,7 @@ class ShownImages:
         self.view, self.reflectance = view, reflectance
         self._whole = view.meshes == tuple(range(len(scene.meshes)))
         chosen = scene.meshes if self._whole else tuple(scene.meshes[i] for i in view.meshes)
-        self.scene = replace(scene, meshes=chosen, mirror=None, camera=None)
+        self.scene = replace(scene, meshes=chosen, mirror=None, refractor=None, camera=None)
         ends = np.cumsum([0] + [len(mesh.vertices) for mesh in scene.meshes])
         self._rows = [slice(int(ends[i]), int(ends[i + 1])) for i in view.meshes]
         self._settings: dict[str, Any] = {"shading": shading, "normals": normals, "shadows": shadows}

@@ -15,10 +15,11 @@ def environment_map(
 ) -> EnvironmentMap:
     """Colors of a scene in all directions from a point: two paraboloid views (Gascuel et al. 2008, section 5.3).
 
-    scene: a Scene, a Mesh or several meshes; its mirror is left out. position (3,): world, away from surfaces. size:
-    pixels along a side of each view, 8 to 16384. shading, method and settings: see `render`. Raises InputError.
+    scene: a Scene, a Mesh or several meshes; its mirror or refractor is left out. position (3,): world, away from
+    surfaces. size: pixels along a side of each view, 8 to 16384. shading, method and settings: see `render`.
+    Raises InputError.
     """
     cameras = back_to_back(as_vector(position, "position"), check_size(size))
-    whole = replace(Scene.of(scene), mirror=None)
+    whole = replace(Scene.of(scene), mirror=None, refractor=None)
     front, back = (render(camera, whole, method, shading=shading, **settings) for camera in cameras)
     return EnvironmentMap(position, (front, back))

@@ -54,7 +54,12 @@ class Mirror:
                 raise InputError(
                     f"mirror index={shown(self.index)}: give a finite number above 0, or None for a mirror"
                 )
-        color = np.asarray(self.color, np.float64) if np.shape(self.color) == (3,) else np.full(3, np.nan)
-        if not np.isfinite(color).all() or (color < 0).any():
-            raise InputError(f"mirror color={shown(self.color)}: give 3 finite linear RGB numbers, none negative")
-        object.__setattr__(self, "color", (float(color[0]), float(color[1]), float(color[2])))
+        object.__setattr__(self, "color", tint_of("mirror", self.color))
+
+
+def tint_of(what: str, color: Any) -> tuple[float, float, float]:
+    """A color that something multiplies light by, as three numbers; raises InputError for anything else."""
+    found = np.asarray(color, np.float64) if np.shape(color) == (3,) else np.full(3, np.nan)
+    if not np.isfinite(found).all() or (found < 0).any():
+        raise InputError(f"{what} color={shown(color)}: give 3 finite linear RGB numbers, none negative")
+    return float(found[0]), float(found[1]), float(found[2])

@@ -11,6 +11,7 @@ from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.scene.mirror import Mirror
+from mpcam.scene.refractor import Refractor
 
 Vector = tuple[float, float, float]
 
@@ -60,7 +61,8 @@ class Scene:
     """What is rendered: meshes in world coordinates, lights, and a camera.
 
     meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
-    linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. environment: an
+    linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. refractor: a thing of glass
+    through which `render` and `refraction` do; a scene has one of the two at most. environment: an
     EnvironmentMap that rays see which miss everything, in place of the background. reliefs: one ReliefInstances or
     several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. Raises InputError
     where a field has the wrong kind.
@@ -75,6 +77,7 @@ class Scene:
     mirror: Mirror | None = None
     environment: Any = None
     reliefs: tuple[Any, ...] = ()
+    refractor: Refractor | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
@@ -83,6 +86,10 @@ class Scene:
         object.__setattr__(self, "background", _vector(self.background, "background", positive=True))
         if self.mirror is not None and not isinstance(self.mirror, Mirror):
             raise InputError(f"scene mirror is a {type(self.mirror).__name__}: give mpcam.Mirror(surface)")
+        if self.refractor is not None and not isinstance(self.refractor, Refractor):
+            raise InputError(f"scene refractor is a {type(self.refractor).__name__}: give mpcam.Refractor(surface)")
+        if self.mirror is not None and self.refractor is not None:
+            raise InputError("a scene with a mirror and a refractor: neither shows the other, leave one of them out")
         if self.environment is not None and not hasattr(self.environment, "on_device"):
             raise InputError(f"scene environment is a {type(self.environment).__name__}: give an mpcam.EnvironmentMap")
         reliefs = self.reliefs if isinstance(self.reliefs, (list, tuple)) else (self.reliefs,)
