@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from mpcam.effects.occlusion import form_factor as form_factor
     from mpcam.effects.reflection import Reflection as Reflection
     from mpcam.effects.reflection import reflection as reflection
+    from mpcam.effects.refraction import Refraction as Refraction
+    from mpcam.effects.refraction import refraction as refraction
     from mpcam.effects.relief import Relief as Relief
     from mpcam.effects.relief_hits import ReliefHits as ReliefHits
     from mpcam.effects.relief_hits import relief_hits as relief_hits
@@ -90,6 +92,7 @@ if TYPE_CHECKING:
     from mpcam.rendering.shade import shade as shade
     from mpcam.scene.builtin import builtin_scene as builtin_scene
     from mpcam.scene.mirror import Mirror as Mirror
+    from mpcam.scene.refractor import Refractor as Refractor
     from mpcam.scene.scene import DirectionalLight as DirectionalLight
     from mpcam.scene.scene import PointLight as PointLight
     from mpcam.scene.scene import Scene as Scene
@@ -117,6 +120,7 @@ _HOMES = {
     "mpcam.effects.horizon_occlusion": "screen_occlusion",
     "mpcam.effects.occlusion": "ambient_occlusion form_factor",
     "mpcam.effects.reflection": "Reflection reflection",
+    "mpcam.effects.refraction": "Refraction refraction",
     "mpcam.effects.relief": "Relief",
     "mpcam.effects.relief_hits": "ReliefHits relief_hits",
     "mpcam.effects.relief_instances": "ReliefInstances",
@@ -148,6 +152,7 @@ _HOMES = {
     "mpcam.rendering.shade": "shade",
     "mpcam.scene.builtin": "builtin_scene",
     "mpcam.scene.mirror": "Mirror",
+    "mpcam.scene.refractor": "Refractor",
     "mpcam.scene.scene": "DirectionalLight PointLight Scene",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -21,6 +21,7 @@ from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import part_of
 from mpcam.rendering.device_camera import world_rays
 from mpcam.scene.mirror import Mirror
+from mpcam.scene.refractor import Refractor
 from mpcam.scene.scene import Scene
 
 
@@ -34,7 +35,7 @@ class ByDepthImages:
     def __init__(
         self,
         scene: Scene,
-        mirror: Mirror,
+        mirror: Mirror | Refractor,
         eye: np.ndarray,
         ray: Ray,
         width: int,
@@ -117,7 +118,7 @@ class ByDepthImages:
         return light
 
 
-def own_images(mirror: Mirror, eye: np.ndarray, size: int, aside: float) -> list[DepthImage]:
+def own_images(mirror: Mirror | Refractor, eye: np.ndarray, size: int, aside: float) -> list[DepthImage]:
     """Depth images, with normals, of the mirror itself, as the eye sees it, or all around where the eye is within."""
     mesh = reflector_of(mirror.surface).mesh
     center, radius = ball_of(used_vertices(mesh))

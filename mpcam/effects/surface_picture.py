@@ -11,6 +11,7 @@ from mpcam.backend import aligned, exclusive, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.effects.mirror_parts import MirrorPart
 from mpcam.effects.mirror_rays import MirrorRays
+from mpcam.effects.refractor_rays import RefractorRays
 from mpcam.errors import InputError
 from mpcam.geometry.moved import moved
 from mpcam.rendering.explanation import Explanation, Step
@@ -68,7 +69,7 @@ class SurfacePicture(ABC):
 
     @functools.cached_property
     @abstractmethod
-    def rays(self) -> MirrorRays:
+    def rays(self) -> MirrorRays | RefractorRays:
         """The rays that the surface sends on, and how far it is."""
 
     @property

@@ -17,6 +17,7 @@ from mpcam.geometry.surfaces import Surface
 from mpcam.geometry.textures import plaster, textured
 from mpcam.math.pose import look_at
 from mpcam.scene.mirror import Mirror
+from mpcam.scene.refractor import Refractor
 from mpcam.scene.scene import DirectionalLight, Scene
 
 COUNTS = (2_000, 20_000, 330_000)
@@ -70,7 +71,7 @@ def refraction_scene(triangles: int = COUNTS[1], width: int = 640, height: int =
         (SUN,),
         ambient=AMBIENT,
         name="teapot behind glass",
-        mirror=Mirror(glass, index=1.3, color=(0.95, 0.98, 0.97)),
+        refractor=Refractor(glass, index=1.3, color=(0.95, 0.98, 0.97)),
         environment=sky(),
     )
 

@@ -27,3 +27,19 @@ def refract(incident: Vector, normal: Vector, index: Array) -> tuple[Vector, Arr
     under = 1.0 - eta * eta * (1.0 - cosine * cosine)
     along = side * (eta * cosine - safe_sqrt(under))
     return vector(*(eta * i[k] + along * n[k] for k in range(3))), under >= 0
+
+
+def fresnel(incident: Vector, normal: Vector, index: Array) -> Array:
+    """Part of unpolarized light that an interface reflects, 1 at total internal reflection (Fresnel's equations).
+
+    Arguments as for `refract`.
+    """
+    eta = 1.0 / index
+    before = abs(dot(normalize(incident), normalize(normal)))
+    under = 1.0 - eta * eta * (1.0 - before * before)
+    after = safe_sqrt(under)
+    across, along, tiny = eta * before + after, before + eta * after, 1e-30
+    crosswise = (eta * before - after) / where(across > tiny, across, 1.0)
+    parallel = (before - eta * after) / where(along > tiny, along, 1.0)
+    part = 0.5 * (crosswise * crosswise + parallel * parallel)
+    return where((under > 0) & (across > tiny) & (along > tiny), part, 1.0)
