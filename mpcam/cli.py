@@ -152,13 +152,13 @@ def render(
 
     Where the scene has a mirror, the rest is seen in it: by camera triangles (--method invert), by its vertices with
     straight edges between (vertex), by an environment map (environment), by depth images that rays are met with
-    (depth_image) or by rays of the true surface (raytrace).
+    (depth_image) or by rays of the true surface (raytrace). Through a refractor the rest is seen by the last three.
 
     Args:
         scene: TOML file, mesh file or name of a built-in scene.
         output: Image file: .png, .exr and others.
         method: invert, vertex, two_pass, cubemap, hemicube or raytrace; with a mirror invert, vertex, environment,
-            depth_image or raytrace.
+            depth_image or raytrace; with a refractor depth_image, environment or raytrace.
         size: Image size in pixels, as 640x480 or 512.
         projection: paraboloid, cosine_sphere, equisolid, equidistant or pinhole, in place of the scene's own camera.
         shading: light, color, normal or texture.
@@ -190,7 +190,7 @@ def render(
     asked = {"level": level, "patch": patch, "resolution": resolution, "bound": bound, "cull": cull}
     settings: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     settings |= (mirror or InMirror()).settings()
-    if explain and loaded.mirror is None:
+    if explain and loaded.mirror is None and loaded.refractor is None:
         from mpcam.pictures.explain import explain as explained
 
         print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))

@@ -1,4 +1,4 @@
-"""What mirrors need of the command line: options of `render`, and the commands decompose, caustics, surround."""
+"""What mirrors and glass need of the command line: options of `render`; decompose, caustics, surround."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from mpcam.errors import InputError
 @Parameter(name="*")
 @dataclass(frozen=True)
 class InMirror:
-    """How the scene's mirror is shown.
+    """How the scene's mirror, or its refractor, is shown.
 
     Args:
         triangles: Camera triangles that stand for it; the scene's own number if not given.
@@ -22,6 +22,9 @@ class InMirror:
         bounces: How often rays are reflected, for --method depth_image and raytrace.
         reflectance: Part of the light that the scene's meshes reflect, with more than one bounce.
         own: Show the mirror in itself, with more than one bounce.
+        second: How the interface is found at which rays leave a refractor: march, wyman, trace or none.
+        inner: Total reflections inside of a refractor that are followed.
+        fresnel: Let the outer surface of a refractor reflect.
     """
 
     triangles: int | None = None
@@ -30,9 +33,12 @@ class InMirror:
     bounces: int | None = None
     reflectance: float | None = None
     own: bool | None = None
+    second: str | None = None
+    inner: int | None = None
+    fresnel: bool | None = None
 
     def settings(self) -> dict[str, Any]:
-        """What was given, by the names of `mpcam.Reflection`."""
+        """What was given, by the names of `mpcam.Reflection` and `mpcam.Refraction`."""
         given = {"size" if name == "image_size" else name: value for name, value in asdict(self).items()}
         return {name: value for name, value in given.items() if value is not None}
 

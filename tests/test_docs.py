@@ -253,6 +253,7 @@ SECTIONS = (
     ('`type = "directional"`', tables.DirectionalTable, None),
     ('`type = "point"`', tables.PointTable, None),
     ("## `[mirror]`", tables.MirrorTable, None),
+    ("## `[refractor]`", tables.RefractorTable, None),
     ("### `[mirror.depth_images]`", tables.DepthImagesTable, None),
     ("## `[environment]`", tables.EnvironmentTable, None),
     ("## `[compare]`", tables.CompareTable, None),

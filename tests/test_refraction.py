@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import mpcam as mp
+from mpcam.comparison.mirrors import mirror_plan
 from mpcam.effects.refractor_rays import RefractorRays
 from mpcam.effects.refractor_solid import solid_of
+from mpcam.io.scenes import load_scene
 from mpcam.math.optics import fresnel
 
 EYE, CENTER = np.array((0.7, -3.1, 1.2)), np.array((0.2, 0.1, -0.3))
@@ -316,3 +318,72 @@ def test_mistakes_in_scenes_are_told():
         mp.Scene((thing(),), mirror=mp.Mirror(mp.Surface.wave()), refractor=mp.Refractor(mp.Surface.sphere()))
     with pytest.raises(mp.InputError, match="scene refractor is a Mirror"):
         mp.Scene((thing(),), refractor=mp.Mirror(mp.Surface.sphere()))
+
+
+def test_a_scene_file_and_the_command_line_know_glass(tmp_path, capsys):
+    from mpcam.cli import app, main
+
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        '[[mesh]]\nbuiltin = "cube"\nscale = 0.4\ntranslate = [0, 2, 0.1]\n'
+        '[camera]\nmodel = "pinhole"\nsize = [40, 30]\nfov = 40\neye = [0.4, -3, 0.5]\ntarget = [0, 0, 0]\n'
+        '[refractor]\nsurface = "ellipsoid"\nradii = [0.8, 0.5, 0.6]\nindex = 1.3\ncolor = [0.5, 1, 1]\n'
+        'second = "wyman"\ninner = 1\nfresnel = true\n[refractor.depth_images]\nsize = 48\naside = 0.5\n'
+        '[compare]\nmethods = ["depth_image", "raytrace"]\ndepth_image.sizes = [32, 64]\n'
+    )
+    loaded = load_scene(file)
+    glass = loaded.scene.refractor
+    assert glass is not None
+    assert (glass.index, glass.color, glass.second, glass.inner) == (1.3, (0.5, 1, 1), "wyman", 1)
+    picture = mp.Refraction(loaded.scene)
+    assert (picture.choice.size, picture.choice.aside, picture.inside.second) == (48, 0.5, "wyman")
+    assert picture.inside.fresnel and mp.Refraction(loaded.scene, method="raytrace").inside.second == "trace"
+    arguments = [
+        "render",
+        str(file),
+        "--second",
+        "march",
+        "--inner",
+        "0",
+        "--image-size",
+        "64",
+        "--explain",
+        "--output",
+    ]
+    app([*arguments, str(tmp_path / "a.exr")], result_action="return_value")
+    expected = mp.refraction(loaded.scene, second="march", inner=0, size=64)
+    assert np.allclose(mp.read_image(tmp_path / "a.exr")[..., :3], expected, atol=2e-3)
+    assert not np.allclose(expected, picture.image(), atol=0.05)
+    assert "inner side" in capsys.readouterr().err
+    for option in ("--method=vertex", "--second=guess", "--bounces=2"):
+        assert main(["render", str(file), option, "--output", str(tmp_path / "b.png")]) == 2
+    assert not (tmp_path / "b.png").exists()
+    start = file.read_text()
+    for old, new, words in (
+        ("[compare]", '[mirror]\nsurface = "wave"\n[compare]', "a mirror or a refractor"),
+        ("radii = [0.8, 0.5, 0.6]", "radius = 2", "refractor.radius = 2"),
+        ('"wyman"', '"guess"', "refractor.second"),
+        ('surface = "ellipsoid"\nradii = [0.8, 0.5, 0.6]', 'builtin = "plane"', None),
+    ):
+        file.write_text(start.replace(old, new))
+        with pytest.raises(mp.InputError, match=words or "not closed"):
+            mp.refraction(load_scene(file).scene)
+
+
+def test_comparisons_tell_what_the_second_interface_costs(tmp_path):
+    shown = scene(mp.Surface.ellipsoid((0.9, 0.5, 0.7)).transformed(TURN), size=(48, 36), index=1.3)
+    plan = {"depth_image": [{"size": 256}, {"size": 256, "second": "none"}], "environment": [64]}
+    found = mp.compare(shown, settings=plan, repeats=1, output=tmp_path / "out")
+    rows = {(row.method, row.setting): row for row in found.rows}
+    assert list(rows) == [
+        ("environment", "64"),
+        ("depth_image", "256"),
+        ("depth_image", "256 second=none"),
+        ("raytrace", ""),
+    ]
+    assert rows["raytrace", ""].rmse == 0 < 3 * rows["depth_image", "256"].rmse < rows["environment", "64"].rmse
+    assert 3 * rows["depth_image", "256"].rmse < rows["depth_image", "256 second=none"].rmse
+    assert "0 % of the rays" in rows["depth_image", "256"].note and found.scene["refractor"] == "Ellipsoid, index 1.3"
+    assert len(mirror_plan(shown, None, None)) == 3 + 4 + 2 + 1
+    with pytest.raises(mp.InputError, match="shows no refractor"):
+        mp.compare(shown, methods="camera_triangles")

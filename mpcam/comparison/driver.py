@@ -73,8 +73,9 @@ def compare(
     if output is not None:
         check_output(output)
     mesh = scene.mesh
-    if scene.mirror is not None:
-        return _mirrored(scene, camera, mirror_plan(methods, settings), repeats, output, progress, shading, moving)
+    if scene.mirror is not None or scene.refractor is not None:
+        plan = mirror_plan(scene, methods, settings)
+        return _mirrored(scene, camera, plan, repeats, output, progress, shading, moving)
     plan = make_plan(mesh.triangle_count, methods, settings, camera)
     each = 1 + (1 + WARMUP + repeats) * (3 if moving else 2)
     steps = StepCounter(progress, 2 + len(plan) * each)
@@ -164,7 +165,7 @@ def _mirrored(
     shading: str,
     moving: bool,
 ) -> Comparison:
-    """`compare` for a scene with a mirror."""
+    """`compare` for a scene with a mirror or a refractor."""
     each = 1 + (WARMUP + repeats) * (2 if moving else 1)
     steps = StepCounter(progress, 2 + len(plan) * each)
     rows, images, truth = mirror_rows(
@@ -179,11 +180,11 @@ def _mirrored(
     )
     front = pareto_front([row.flip for row in rows], [row.still_ms for row in rows])
     how = _how(repeats, moving) | {
-        "still": "a whole picture when all building is done: what is beside the mirror and in it, both shaded",
-        "truth": "rays of the mirror's true surface, traced by Mitsuba, and the same shading of their first hits",
+        "still": "a whole picture when all building is done: what is beside the mirror or glass and in it, both shaded",
+        "truth": "rays of the true surface, traced by Mitsuba, and the same shading of their first hits",
     }
-    surface = scene.mirror.surface
-    facts = {"mirror": f"{type(surface).__name__}" + (f", index {scene.mirror.index}" if scene.mirror.index else "")}
+    what, found = ("mirror", scene.mirror) if scene.mirror is not None else ("refractor", scene.refractor)
+    facts = {what: type(found.surface).__name__ + (f", index {found.index}" if found.index else "")}
     comparison = Comparison(
         rows=tuple(replace(row, on_front=bool(on)) for row, on in zip(rows, front, strict=True)),
         name=scene.name,

@@ -1,4 +1,5 @@
-"""`mpcam.compare` for scenes with a mirror: camera triangles, vertices, environment maps, depth images, rays."""
+"""`mpcam.compare` for scenes with a mirror: camera triangles, vertices, environment maps, depth images, rays; and for
+scenes with a refractor, by the last three."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -15,26 +16,40 @@ from mpcam.comparison.rows import Row
 from mpcam.decomposition.ray_error import ray_error
 from mpcam.effects.mirror_methods import MIRROR_METHODS
 from mpcam.effects.reflection import Reflection
+from mpcam.effects.refraction import Refraction
+from mpcam.effects.refractor_methods import REFRACTOR_METHODS
 from mpcam.errors import InputError
 from mpcam.scene.scene import Scene
 
 FINE = 416
 """Camera triangles in which the vertices of method "vertex" are looked for."""
 
+OTHER_SECONDS = ({"size": 512, "second": "wyman"}, {"size": 512, "second": "none"})
+"""With depth images behind glass: how else rays may come through it."""
+
 
 def mirror_plan(
-    methods: Iterable[str] | None, settings: Mapping[str, Sequence[Mapping[str, Any] | float]] | None
+    scene: Scene,
+    methods: Iterable[str] | None,
+    settings: Mapping[str, Sequence[Mapping[str, Any] | float]] | None,
 ) -> list[Choice]:
-    """Methods and settings for a scene with a mirror; see `mpcam.compare`. Raises InputError for other names."""
-    given = MIRROR_METHODS if methods is None else [methods] if isinstance(methods, str) else methods
+    """Methods and settings for a scene with a mirror or a refractor; see `mpcam.compare`.
+
+    Raises InputError for other names.
+    """
+    what, register = ("mirror", MIRROR_METHODS) if scene.mirror is not None else ("refractor", REFRACTOR_METHODS)
+    given = register if methods is None else [methods] if isinstance(methods, str) else methods
     names = list(dict.fromkeys(given))
     settings = dict(settings or {})
     for name in (*names, *settings):
-        if name not in MIRROR_METHODS:
-            raise InputError(f"Method {name!r} shows no mirror; the methods: {', '.join(MIRROR_METHODS)}.")
+        if name not in register:
+            raise InputError(f"Method {name!r} shows no {what}; the methods: {', '.join(register)}.")
     choices = []
     for name in names:
-        for entry in settings.get(name, MIRROR_METHODS[name].values or ({},)):
+        usual: tuple[Any, ...] = register[name].values or ({},)
+        if what == "refractor" and name == "depth_image":
+            usual += OTHER_SECONDS
+        for entry in settings.get(name, usual):
             if not isinstance(entry, Mapping):
                 parameter = knob(name)
                 if parameter is None:
@@ -61,10 +76,11 @@ def mirror_rows(
     otherwise, the atlas has as many pixels as the camera has on the mirror, and vertices are projected by FINE camera
     triangles.
     """
-    true = Reflection(scene, camera, method="raytrace", shading=shading)
+    make: Any = Reflection if scene.mirror is not None else Refraction
+    true = make(scene, camera, method="raytrace", shading=shading)
     truth, pixels = true.image(), int(true.mask.sum())
     steps.done("truth")
-    pictures: dict[str, Reflection] = {}
+    pictures: dict[str, Reflection | Refraction] = {}
     rows: dict[str, Row] = {}
     images: dict[str, np.ndarray] = {}
     for choice in plan:
@@ -74,7 +90,7 @@ def mirror_rows(
             settings.setdefault("triangles", FINE)
         if choice.method == "camera_triangles" and "triangles" in settings and "resolution" not in settings:
             settings["resolution"] = max(4, round(np.sqrt(2 * pixels / settings["triangles"])))
-        picture = Reflection(scene, camera, method=choice.method, shading=shading, **settings)
+        picture = make(scene, camera, method=choice.method, shading=shading, **settings)
         image = picture.image()
         first = 1e3 * (timing.now() - started)
         rmse = metrics.image_rmse(image, truth)
@@ -86,9 +102,9 @@ def mirror_rows(
             psnr=metrics.psnr(rmse),
             flip=float(metrics.flip_map(image, truth).mean()),
             compile_ms=first,
-            note=_note(choice.method),
+            note=_note(choice.method, picture),
         )
-        if choice.method == "camera_triangles":
+        if isinstance(picture, Reflection) and choice.method == "camera_triangles":
             row = _counted(row, picture, camera)
         pictures[choice.label], rows[choice.label], images[choice.label] = picture, row, image
         steps.done(choice.label)
@@ -113,7 +129,12 @@ def frame_times(scene: Scene, camera: Any, decompositions: Sequence[CameraTriang
     return [found.median for found in timing.measure(calls, repeats=9, warmup=2).values()]
 
 
-def _note(method: str) -> str:
+def _note(method: str, picture: Reflection | Refraction) -> str:
+    if isinstance(picture, Refraction):
+        if picture.inside.second == "trace":
+            return "the truth, so its errors against it are 0 by definition" if method == "raytrace" else ""
+        glass, lost = int(picture.mask.sum()), int(picture.rays.missing.sum())
+        return f"no second interface is found by {100 * lost / max(glass, 1):.2g} % of the rays in the glass"
     if method == "vertex":
         return f"straight edges between vertices; {FINE} camera triangles unless the setting names others"
     return "the truth, so its errors against it are 0 by definition" if method == "raytrace" else ""

@@ -10,7 +10,7 @@ from mpcam.geometry.mesh import Material, Mesh
 from mpcam.io.camera_tables import CameraFile, any_camera_table
 from mpcam.io.images import read_image
 from mpcam.io.scene_camera import build_camera, default_camera
-from mpcam.io.scene_mirror import build_mirror
+from mpcam.io.scene_mirror import build_mirror, build_refractor
 from mpcam.io.scene_place import color, placement
 from mpcam.io.scene_relief import build_relief, source_mesh
 from mpcam.io.scene_tables import DirectionalTable, EnvironmentTable, MeshTable, PointTable, SceneTable
@@ -36,6 +36,8 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         lights: tuple[Light, ...] = (default_light(camera),)
     else:
         lights = tuple(_light(entry, index, text) for index, entry in enumerate(table.light))
+    if table.mirror is not None and table.refractor is not None:
+        raise text.error(("refractor",), "a scene has a mirror or a refractor: leave one of them out")
     return Scene(
         meshes,
         camera=camera,
@@ -44,6 +46,7 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         background=color(table.background, text, "background"),
         name=table.name or name,
         mirror=None if table.mirror is None else build_mirror(table.mirror, folder, text),
+        refractor=None if table.refractor is None else build_refractor(table.refractor, folder, text),
         environment=None if table.environment is None else _environment(table.environment, folder, text),
         reliefs=reliefs,
     )

@@ -42,7 +42,8 @@ Share = Annotated[float, Meta(ge=0, le=1)]
 
 
 class DepthImagesTable(Table, frozen=True):
-    """[mirror.depth_images]: what method depth_image meets the mirror's rays with; chosen for each mesh, or cameras."""
+    """[mirror.depth_images], [refractor.depth_images]: what method depth_image meets the rays that go on with; chosen
+    for each mesh, or cameras."""
 
     size: Annotated[int, Meta(ge=8, le=8192)] = 512  # pixels along a side
     aside: Annotated[float, Meta(ge=0)] = 1.0  # how far around things they reach, in radii; 0: pinholes
@@ -51,8 +52,8 @@ class DepthImagesTable(Table, frozen=True):
     cameras: Annotated[list[str], Meta(min_length=1)] | None = None  # camera files, which see the whole scene
 
 
-class MirrorTable(Table, frozen=True):
-    """[mirror]: a curved mirror, or with index an interface; one of surface (exact), file or builtin (a mesh).
+class ShapeTable(Table, frozen=True):
+    """A curved surface: one of surface (exact), file or builtin (a mesh).
 
     The keys of a surface are those of its function in mpcam.Surface, angle in degrees. Rotated, then moved.
     """
@@ -72,16 +73,30 @@ class MirrorTable(Table, frozen=True):
     rotate: RotateTable | None = None
     translate: Vector = (0.0, 0.0, 0.0)
     scale: Scale = 1.0  # meshes only
+    color: Color = 1.0  # what is seen is multiplied by it
+    depth_images: DepthImagesTable | None = None
+
+
+class MirrorTable(ShapeTable, frozen=True):
+    """[mirror]: a curved mirror, or with index an interface."""
+
     index: Positive | None = None  # refractive index behind the surface over that in front; default: a mirror
-    color: Color = 1.0
     triangles: Annotated[int, Meta(ge=1, le=100000)] = 104  # camera triangles
     resolution: Annotated[int, Meta(ge=2, le=8192)] = 64  # pixels along the short sides of each
     mode: Literal["normals", "directions", "general_linear", "continuous"] = "normals"  # how rays run within each
-    depth_images: DepthImagesTable | None = None
     bounces: Annotated[int, Meta(ge=1, le=8)] = 1  # how often rays are reflected, where a method can
     reflectance: Share | list[Share] = 0.0  # part of the light that the meshes reflect, with more than one bounce
     own: bool = False  # whether the mirror is seen in itself, with more than one bounce
     camera_triangles: str | None = None  # .npz file of `mpcam fit`, for this camera: in place of cutting the mirror
+
+
+class RefractorTable(ShapeTable, frozen=True):
+    """[refractor]: a thing of glass, whose surface is closed."""
+
+    index: Positive = 1.5  # refractive index of the inside over that of the outside
+    second: Literal["march", "wyman", "trace", "none"] = "march"  # how the interface is found where rays leave
+    inner: Annotated[int, Meta(ge=0, le=8)] = 2  # total reflections inside that are followed
+    fresnel: bool = False  # whether the outer surface reflects
 
 
 class GridTable(Table, frozen=True):
@@ -174,8 +189,8 @@ Method = Literal[
 class CompareTable(Table, frozen=True):
     """[compare]: what `mpcam compare` runs; a key that is left out is chosen there.
 
-    Scenes with a mirror are compared by camera_triangles, vertex, environment, depth_image and raytrace, others by
-    invert, vertex, two_pass, cubemap, hemicube and raytrace.
+    Scenes with a mirror are compared by camera_triangles, vertex, environment, depth_image and raytrace, scenes with a
+    refractor by the last three, others by invert, vertex, two_pass, cubemap, hemicube and raytrace.
     """
 
     methods: Annotated[list[Method], Meta(min_length=1)] | None = None
@@ -199,6 +214,7 @@ class SceneTable(Table, frozen=True):
     ambient: Color = 0.15
     background: Color = 0.0
     mirror: MirrorTable | None = None
+    refractor: RefractorTable | None = None
     environment: EnvironmentTable | None = None
     relief: list[ReliefTable] = []
     compare: CompareTable = CompareTable()

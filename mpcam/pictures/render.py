@@ -9,6 +9,8 @@ from mpcam.cameras.base import Camera
 from mpcam.effects.horizon_occlusion import check_screen, screen_occlusion_device
 from mpcam.effects.mirror_methods import MIRROR_METHODS
 from mpcam.effects.reflection import Reflection
+from mpcam.effects.refraction import Refraction
+from mpcam.effects.refractor_methods import REFRACTOR_METHODS
 from mpcam.effects.relief_picture import ReliefPicture
 from mpcam.effects.shadows import shadow_maps
 from mpcam.errors import InputError
@@ -40,8 +42,9 @@ def render(
     once and give them to `shade`. A scene with a mirror is shown with what is seen in it: by camera triangles with
     method "invert", by its vertices' images with "vertex", by rays of the true surface with "raytrace", by those rays
     and depth images with "depth_image", or by an "environment" map; for the settings, and for many frames, see
-    `Reflection`. A scene with reliefs is shown with them, by any method for the rest; for many frames see
-    `ReliefPicture`. explain: print to standard error which stages run, which are left out and why (see
+    `Reflection`. Through a refractor the rest is seen by "depth_image", which is "invert" too, "environment" or
+    "raytrace"; see `Refraction`. A scene with reliefs is shown with them, by any method for the rest; for many frames
+    see `ReliefPicture`. explain: print to standard error which stages run, which are left out and why (see
     `mpcam.explain`). Raises InputError.
     """
     named: dict[str, Any] = {"shading": shading, "shadows": shadows, "shadow_size": shadow_size}
@@ -61,14 +64,17 @@ def image_and_depth(
     explain: bool,
     **settings: Any,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """The same as `render`, and if wanted the distances (H, W) along the rays; None in a scene with a mirror."""
+    """The same as `render`, and if wanted the distances (H, W) along the rays; None with a mirror or a refractor."""
     whole = Scene.of(scene)
-    if whole.mirror is not None and occlusion is not None:
-        raise InputError("occlusion is not known for scenes with a mirror: leave one of them out")
-    if whole.reliefs and whole.mirror is not None:
-        raise InputError("a mirror shows no reliefs: leave one of them out, or give the reliefs as meshes")
-    if whole.mirror is not None:
-        return _mirrored(camera, whole, method, shading, shadow_size if shadows else 0, explain, settings), None
+    seen_on = "mirror" if whole.mirror is not None else "refractor" if whole.refractor is not None else ""
+    if seen_on and occlusion is not None:
+        raise InputError(f"occlusion is not known for scenes with a {seen_on}: leave one of them out")
+    if whole.reliefs and seen_on:
+        raise InputError(f"a {seen_on} shows no reliefs: leave one of them out, or give the reliefs as meshes")
+    if seen_on:
+        return _on_surface(
+            camera, whole, seen_on, method, shading, shadow_size if shadows else 0, explain, settings
+        ), None
     if whole.reliefs and occlusion is not None:
         raise InputError("occlusion is not known for scenes with reliefs: leave one of them out")
     if occlusion is not None:
@@ -87,24 +93,36 @@ def image_and_depth(
     return shade(hits, whole, shading, maps, exposure), hits.depth if depth else None
 
 
-def _mirrored(
-    camera: Camera, scene: Scene, method: str, shading: str, shadow_size: int, explain: bool, settings: dict[str, Any]
+def _on_surface(
+    camera: Camera,
+    scene: Scene,
+    what: str,
+    method: str,
+    shading: str,
+    shadow_size: int,
+    explain: bool,
+    settings: dict[str, Any],
 ) -> np.ndarray:
-    """`render` of a scene with a mirror."""
-    names = {"invert": "camera_triangles"} | {name: name for name in MIRROR_METHODS if name != "camera_triangles"}
+    """`render` of a scene with a mirror or a refractor."""
+    register, make, usual = (
+        (MIRROR_METHODS, Reflection, "camera_triangles")
+        if what == "mirror"
+        else (REFRACTOR_METHODS, Refraction, "depth_image")
+    )
+    names = {"invert": usual} | {name: name for name in register if name != "camera_triangles"}
     if method not in names:
-        raise InputError(f"method={method!r} shows no mirror: allowed are {', '.join(names)}, or leave the mirror out")
-    allowed = [name for name in MIRROR_METHODS[names[method]].home(camera).names if name != "cams"]
+        raise InputError(f"method={method!r} shows no {what}: allowed are {', '.join(names)}, or leave the {what} out")
+    allowed = [name for name in register[names[method]].home(camera).names if name != "cams"]
     for name in settings:
         if name not in allowed:
             raise InputError(
-                f"method={method!r} has no setting {name!r} where there is a mirror: allowed are "
+                f"method={method!r} has no setting {name!r} where there is a {what}: allowed are "
                 f"{', '.join(allowed) or 'none'}"
             )
     maps: Any = ()
     if shadow_size:
         maps = shadow_maps(scene, shadow_size, shading)
-    picture = Reflection(scene, camera, method=names[method], shading=shading, shadows=maps, **settings)
+    picture = make(scene, camera, method=names[method], shading=shading, shadows=maps, **settings)
     if explain:
         sys.stderr.write(f"{picture.explanation}\n")
     return picture.image()
