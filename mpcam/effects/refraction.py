@@ -48,12 +48,12 @@ class Refraction(SurfacePicture):
     throws no shadow. settings: of the method, see `GlassDepthImageSettings`, `GlassEnvironmentSettings` and
     `InsideSettings`.
 
-    second: how rays come to leave the glass. "march": they are met with depth images of its inner side, and follow
-    `inner` total reflections there. "wyman": the second interface is guessed from the thickness of the glass along the
-    eye's ray and along the normal, and its normal is looked up where the eye would see it (Wyman 2005); it is the
-    quickest, knows no inner reflections, and needs a camera with one image for each point. "none": rays are bent once.
-    "trace": Mitsuba's hits on the true surface, in double precision, for both interfaces; this is the default of method
-    "raytrace", and with it the truth. The others rasterize the first interface.
+    How rays come to leave the glass is told by `second`. "march": they are met with depth images of its inner side, and
+    follow `inner` total reflections there. "wyman": the second interface is guessed from the thickness of the glass
+    along the eye's ray and along the normal, and its normal is looked up where the eye would see it (Wyman 2005); it is
+    the quickest, knows no inner reflections, and needs a camera with one image for each point. "none": rays are bent
+    once. "trace": Mitsuba's hits on the true surface, in double precision, for both interfaces; this is the default of
+    method "raytrace", and with it the truth. The others rasterize the first interface.
 
     Where light cannot get in, or is still inside after `inner` total reflections, a pixel is black. Where no second
     interface is found, a ray runs on as it is. Light that leaves the glass is not bent by it again. With fresnel=True

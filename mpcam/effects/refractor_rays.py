@@ -15,11 +15,11 @@ from mpcam.math.optics import fresnel as reflected_part
 class RefractorRays(NamedTuple):
     """Per pixel of the eye, row by row.
 
-    ray: in the world, where light leaves the glass: origin (N, 3), direction (N, 3); valid (N,): False beside the glass
-    and where no light gets out. distance: (N,) from the eye to the glass, infinite beside it. share: (N,) part of the
-    light that passes both interfaces, 1 without Fresnel's equations. reflected: rays that the outer surface reflects,
-    None without Fresnel's equations; part: (N,) what it reflects. missing: (N,) where no second interface was found,
-    and rays run on as the first has bent them.
+    ray: in the world, where light leaves the glass: origin (N, 3), direction (N, 3), valid (N,), which is False beside
+    the glass and where no light gets out. distance: (N,) from the eye to the glass, infinite beside it. share: (N,)
+    part of the light that passes both interfaces, 1 without Fresnel's equations. reflected: rays that the outer surface
+    reflects, None without Fresnel's equations; part: (N,) what it reflects. missing: (N,) where no second interface was
+    found, and rays run on as the first has bent them.
     """
 
     ray: Ray
