@@ -100,5 +100,10 @@ EXPERIMENTS = {
             "rosen2011_fig1",
             "Rosen et al. 2011, Figs. 1, 11, 15: what depth images lack in a mirror, by camera; errors and times",
         ),
+        Experiment(
+            "rosen2011-fig17-fig19",
+            "rosen2011_fig17_fig19",
+            "Rosen et al. 2011, Figs. 17 and 19: steps of rays over depth images, with and without coarse steps",
+        ),
     )
 }
