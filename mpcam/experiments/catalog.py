@@ -105,5 +105,15 @@ EXPERIMENTS = {
             "rosen2011_fig17_fig19",
             "Rosen et al. 2011, Figs. 17 and 19: steps of rays over depth images, with and without coarse steps",
         ),
+        Experiment(
+            "rosen2011-ambient-occlusion",
+            "rosen2011_ambient_occlusion",
+            "Rosen et al. 2011, Fig. 3: ambient occlusion by the output's z-buffer and by ones that see more",
+        ),
+        Experiment(
+            "rosen2011-table1",
+            "rosen2011_table1",
+            "Rosen et al. 2011, Table 1: time of a reflection by output, fine step, depth image, coarse step; memory",
+        ),
     )
 }

@@ -278,8 +278,8 @@ def _reading(rows: Rows) -> str:
     pieces, march = (_last(rows, walk) for walk in ("pieces", "march"))
     texts.append(
         f"Frustum by frustum rays take {format_number(march['mean'] / pieces['mean'], 2)} times fewer steps through "
-        f"the maze than point by point, and find {format_number(pieces['found_percent'], 4)} % of what the image holds, "
-        f"in place of {format_number(march['found_percent'], 4)} %."
+        f"the maze than point by point, and find {format_number(pieces['found_percent'], 4)} % of what the image "
+        f"holds, in place of {format_number(march['found_percent'], 4)} %."
     )
     return " ".join(texts)
 
