@@ -19,15 +19,13 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.checks import is_number, shown, whole_number
 from mpcam.effects.occlusion_buffers import buffer_share, checked_buffer
 from mpcam.effects.screen_elements import element
 from mpcam.errors import InputError
 from mpcam.rendering.device import device_mesh
 from mpcam.rendering.hits import Hits
+from mpcam.scene.occlusion import Occlusion
 
-FALLOFFS = ("quadratic", "linear", "none")
-MOST_LINES = 1024
 _THICKNESS = 0.05  # of the radius: off the tangent plane, where the blur's weight has fallen to 1 / e
 _UNBOUND = 1e6  # of the mesh's size: stands for an infinite radius
 
@@ -86,14 +84,9 @@ def screen_occlusion_device(
     if not isinstance(hits, Hits):
         raise InputError(f"hits is a {type(hits).__name__}: give hits, mpcam.rasterize(pinhole, scene)")
     camera = check_screen(hits.camera)
-    lines = whole_number("directions", directions, 1, MOST_LINES), whole_number("steps", steps, 1, MOST_LINES)
-    length = checked_lengths(radius, falloff)
-    if not is_number(bias) or not 0 <= bias < 0.5 * math.pi:
-        raise InputError(f"bias={shown(bias)}: radians from 0 to below pi / 2 are needed")
-    window = whole_number("blur", blur, 1, 255, unit="pixels")
-    if window % 2 == 0:
-        raise InputError(f"blur={blur}: an odd number of pixels is needed, so that it has a middle")
-    back, buffers = _checked_buffers(hits, zbuffer, thickness)
+    given = Occlusion(radius, thickness, directions, steps, falloff, bias, blur)
+    lines, length, window = (directions, steps), float(radius), blur
+    back, buffers = given.thickness, _checked_buffers(hits, zbuffer, thickness)
     count = camera.width * camera.height
     if hits.mesh.triangle_count == 0:
         return dr.ones(t.Float, count)
@@ -131,25 +124,12 @@ def check_screen(camera: Any) -> Pinhole:
     return camera
 
 
-def checked_lengths(radius: Any, falloff: Any) -> float:
-    """The radius, where it and the falloff are what they should be."""
-    if not (is_number(radius) and radius > 0) and not (isinstance(radius, float) and radius == math.inf):
-        raise InputError(f"radius={shown(radius)}: give a length above 0 in scene units, or math.inf")
-    if falloff not in FALLOFFS:
-        raise InputError(f"falloff={shown(falloff)}: allowed are {', '.join(FALLOFFS)}")
-    if falloff != "none" and radius == math.inf:
-        raise InputError(f"falloff={falloff!r} needs a radius that is not infinite: give one, or falloff='none'")
-    return float(radius)
-
-
-def _checked_buffers(hits: Hits, zbuffer: Any, thickness: Any) -> tuple[float | None, list[Hits]]:
-    """The thickness, and the z-buffers that are walked, in order."""
-    if thickness is not None and (not is_number(thickness) or thickness <= 0):
-        raise InputError(f"thickness={shown(thickness)}: give a length above 0 in scene units, or None for no end")
+def _checked_buffers(hits: Hits, zbuffer: Any, thickness: float | None) -> list[Hits]:
+    """The z-buffers that are walked, in order."""
     if zbuffer is None:
-        return thickness, [hits]
+        return [hits]
     if not isinstance(zbuffer, (list, tuple)):
-        return thickness, [checked_buffer(zbuffer, hits)]
+        return [checked_buffer(zbuffer, hits)]
     if not zbuffer or (thickness is None and len(zbuffer) > 1):
         raise InputError(
             f"zbuffer has {len(zbuffer)} entries: several need thickness=, a length, since what reaches back without "
@@ -157,7 +137,7 @@ def _checked_buffers(hits: Hits, zbuffer: Any, thickness: Any) -> tuple[float | 
             if zbuffer
             else "zbuffer is empty: give hits of a camera, or None for the frame's own"
         )
-    return thickness, [checked_buffer(one, hits) for one in zbuffer]
+    return [checked_buffer(one, hits) for one in zbuffer]
 
 
 def _planar(z: Any, data: dict[str, Any]) -> Any:

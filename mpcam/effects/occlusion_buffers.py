@@ -170,8 +170,9 @@ def _share(
         view = view * dr.rsqrt(dr.maximum(dr.squared_norm(view), 1e-30))
         there &= dr.squared_norm(view) > 0.5
         view = dr.select(there, dr.select(dr.dot(view, deeper) > 0, -view, view), t.Array3f(0, 0, -1))
-        if not thick:
-            there &= dr.dot(view, surface["normal"]) > 0
+        if not thick:  # what only the hits' camera sees is looked at as from there
+            behind = dr.dot(view, surface["normal"]) <= 0
+            view = dr.select(behind, -point * dr.rsqrt(dr.squared_norm(point)), view)
 
         def lines(way: Any) -> tuple[Any, Any, Any, Any]:
             return u, v, dr.dot(across, way) * radius, dr.dot(down, way) * radius

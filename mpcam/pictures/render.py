@@ -1,6 +1,7 @@
 """`render`: an image of a scene, with or without a mirror, by any method."""
 
 import sys
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mpcam.errors import InputError
 from mpcam.pictures.explain import explain as explained
 from mpcam.rendering.methods import rasterize
 from mpcam.rendering.shade import shade
+from mpcam.scene.occlusion import Occlusion
 from mpcam.scene.scene import Scene
 
 
@@ -26,7 +28,7 @@ def render(
     shading: str = "light",
     shadows: bool = False,
     shadow_size: int = 1024,
-    occlusion: float | None = None,
+    occlusion: float | Occlusion | None = None,
     explain: bool = False,
     **settings: Any,
 ) -> np.ndarray:
@@ -35,12 +37,13 @@ def render(
     scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
     shading "light". shadow_size: pixels along a side of those. occlusion: the radius, scene units, within which
-    surfaces keep ambient light from each other, by the frame's own depths (see `screen_occlusion`); for Pinhole cameras
-    and shading "light". method and settings: see `rasterize`. To render many frames of a still scene, make the maps
-    once and give them to `shade`. A scene with a mirror is shown with what is seen in it: by camera triangles with
-    method "invert", by its vertices' images with "vertex", by rays of the true surface with "raytrace", by those rays
-    and depth images with "depth_image", or by an "environment" map; for the settings, and for many frames, see
-    `Reflection`. A scene with reliefs is shown with them, by any method for the rest; for many frames see
+    surfaces keep ambient light from each other, by the frame's own depths (see `screen_occlusion`), or an `Occlusion`;
+    default the scene's. For Pinhole cameras and shading "light". method and settings: see `rasterize`. To render
+    many frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with
+    what is seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of
+    the true surface with "raytrace", by those rays and depth images with "depth_image", or by an "environment" map;
+    for the settings, and for many frames, see `Reflection`. A scene with reliefs is shown with them, by any method
+    for the rest; for many frames see
     `ReliefPicture`. explain: print to standard error which stages run, which are left out and why (see
     `mpcam.explain`). Raises InputError.
     """
@@ -57,12 +60,16 @@ def image_and_depth(
     shading: str,
     shadows: bool,
     shadow_size: int,
-    occlusion: float | None,
+    occlusion: float | Occlusion | None,
     explain: bool,
     **settings: Any,
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The same as `render`, and if wanted the distances (H, W) along the rays; None in a scene with a mirror."""
     whole = Scene.of(scene)
+    if occlusion is None:
+        occlusion = whole.occlusion
+    elif not isinstance(occlusion, Occlusion):
+        occlusion = Occlusion(occlusion)
     if whole.mirror is not None and occlusion is not None:
         raise InputError("occlusion is not known for scenes with a mirror: leave one of them out")
     if whole.reliefs and whole.mirror is not None:
@@ -83,7 +90,7 @@ def image_and_depth(
         picture = ReliefPicture(whole, camera, method, shading=shading, shadows=maps, **settings)
         return picture.image(), picture.depth() if depth else None
     hits = rasterize(camera, whole.mesh, method, **settings)
-    exposure = None if occlusion is None else screen_occlusion_device(hits, occlusion)
+    exposure = None if occlusion is None else screen_occlusion_device(hits, **asdict(occlusion))
     return shade(hits, whole, shading, maps, exposure), hits.depth if depth else None
 
 

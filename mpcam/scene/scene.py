@@ -11,6 +11,7 @@ from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.scene.mirror import Mirror
+from mpcam.scene.occlusion import Occlusion
 
 Vector = tuple[float, float, float]
 
@@ -62,8 +63,9 @@ class Scene:
     meshes: one Mesh or several. camera: any mpcam camera, or None. lights: one or several. ambient and background:
     linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. environment: an
     EnvironmentMap that rays see which miss everything, in place of the background. reliefs: one ReliefInstances or
-    several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. Raises InputError
-    where a field has the wrong kind.
+    several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. occlusion: how
+    surfaces keep ambient light from each other in what `render` shows. Raises InputError where a field has the wrong
+    kind.
     """
 
     meshes: tuple[Mesh, ...]
@@ -75,6 +77,7 @@ class Scene:
     mirror: Mirror | None = None
     environment: Any = None
     reliefs: tuple[Any, ...] = ()
+    occlusion: Occlusion | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
@@ -85,6 +88,8 @@ class Scene:
             raise InputError(f"scene mirror is a {type(self.mirror).__name__}: give mpcam.Mirror(surface)")
         if self.environment is not None and not hasattr(self.environment, "on_device"):
             raise InputError(f"scene environment is a {type(self.environment).__name__}: give an mpcam.EnvironmentMap")
+        if self.occlusion is not None and not isinstance(self.occlusion, Occlusion):
+            raise InputError(f"scene occlusion is a {type(self.occlusion).__name__}: give mpcam.Occlusion(radius)")
         reliefs = self.reliefs if isinstance(self.reliefs, (list, tuple)) else (self.reliefs,)
         for one in reliefs:
             if not hasattr(one, "placements"):
