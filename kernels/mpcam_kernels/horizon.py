@@ -86,8 +86,8 @@ def covered(
     points to where the buffer is seen from. lines: of a direction at right angles to the view, where its line starts
     in the image and how far it runs within the radius (u, v, du, dv, pixels). spin: numbers from 0 to 1 by which lines
     are turned and steps are shifted. bias: sine of the angle above the tangent plane below which nothing counts.
-    falloff: one of FALLOFFS. thickness: how far samples reach behind themselves; None: without end, which is for points
-    with normal . view > 0 alone.
+    falloff: one of FALLOFFS. thickness: Float, one for each pixel of the buffer, how far its sample reaches back; None:
+    without end, which is for points with normal . view > 0 alone.
     """
     width, height = size
     facing = dr.dot(normal, view)
@@ -113,7 +113,9 @@ def covered(
         shift = _fraction(spin[1] + types.Float(number) * 0.618034)
 
         def step(at: Any, known: Any, sum_: Any) -> Any:
-            place = 1.0 + (far - 1.0) * (types.Float(at) + spin[1]) / steps
+            part = (types.Float(at) + spin[1]) / steps
+            # What is near covers more, and a sample with an end covers nothing between it and the next one.
+            place = 1.0 + (far - 1.0) * (part if thickness is None else part * part)
             column, row = types.Int(dr.floor(u + place * du)), types.Int(dr.floor(v + place * dv))
             inside = good & (column >= 0) & (row >= 0) & (column < width) & (row < height)
             pixel = types.UInt(dr.select(inside, row * width + column, 0))
@@ -130,7 +132,7 @@ def covered(
                 higher = inside & (rise > known)
                 more = weight(distance) * (rise - known)
                 return at + 1, dr.select(higher, rise, known), sum_ + dr.select(higher, more, 0.0)
-            deep = up - thickness
+            deep = up - dr.gather(types.Float, thickness, pixel, inside)
             behind = side * (deep * dr.rsqrt(dr.maximum(level + deep * deep, 1e-30)) + flat)
             sectors = _sectors(types, dr.minimum(rise, behind), dr.maximum(rise, behind), shift)
             fresh = dr.select(inside, sectors & ~known, types.UInt64(0))

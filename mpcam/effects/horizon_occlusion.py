@@ -19,7 +19,7 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.effects.occlusion_buffers import buffer_share, checked_buffer
+from mpcam.effects.occlusion_buffers import buffer_share, checked_backs, checked_buffer, reaches_of
 from mpcam.effects.screen_elements import element
 from mpcam.errors import InputError
 from mpcam.rendering.device import device_mesh
@@ -42,6 +42,7 @@ def screen_occlusion(
     blur: int = 21,
     zbuffer: Hits | Sequence[Hits] | None = None,
     thickness: float | None = None,
+    backs: Hits | Sequence[Hits] | None = None,
 ) -> np.ndarray:
     """Exposure of what a pinhole camera's pixels see to light from everywhere: (H, W) float32, 1 where nothing is hit.
 
@@ -60,7 +61,9 @@ def screen_occlusion(
     which is exact, and slow.
     """
     settings: dict[str, Any] = {"directions": directions, "steps": steps, "falloff": falloff, "bias": bias}
-    exposure = screen_occlusion_device(hits, radius, blur=blur, zbuffer=zbuffer, thickness=thickness, **settings)
+    exposure = screen_occlusion_device(
+        hits, radius, blur=blur, zbuffer=zbuffer, thickness=thickness, backs=backs, **settings
+    )
     return np.asarray(exposure.numpy()).reshape(hits.camera.height, hits.camera.width)
 
 
@@ -76,6 +79,7 @@ def screen_occlusion_device(
     blur: int = 21,
     zbuffer: Hits | Sequence[Hits] | None = None,
     thickness: float | None = None,
+    backs: Hits | Sequence[Hits] | None = None,
 ) -> Any:
     """As `screen_occlusion`, but it stays on the device: an evaluated Float, one entry per pixel."""
     import drjit as dr
@@ -103,12 +107,13 @@ def screen_occlusion_device(
     size = (camera.width, camera.height)
     surface = _surfaces(size)(hits.device_triangle, hits.device_depth, data)
     buffer = _planar(surface["z"], data)
+    reaches = reaches_of(buffers, checked_backs(backs, buffers, back), back)
     exposure = dr.ones(t.Float, count)
-    for number, other in enumerate(buffers):
+    for number, (other, reach) in enumerate(zip(buffers, reaches, strict=True)):
         if other is hits:
-            share = _exposure(size, *lines, falloff, back is not None)(surface, buffer, data)
+            share = _exposure(size, *lines, falloff)(surface, buffer, reach, data)
         else:
-            share = buffer_share(other, buffers[:number], hits, (surface, buffer, data), (*lines, falloff), back)
+            share = buffer_share(other, buffers[:number], hits, (surface, buffer, data), (*lines, falloff), reach)
         exposure = exposure * (1.0 - share)
         dr.eval(exposure)
     if window > 1:
@@ -182,7 +187,7 @@ def _surfaces(size: tuple[int, int]) -> Any:
 
 
 @functools.cache
-def _exposure(size: tuple[int, int], directions: int, steps: int, falloff: str, thick: bool) -> Any:
+def _exposure(size: tuple[int, int], directions: int, steps: int, falloff: str) -> Any:
     """Kernel: share that is covered by what the pinhole sees itself."""
     import drjit as dr
 
@@ -190,10 +195,10 @@ def _exposure(size: tuple[int, int], directions: int, steps: int, falloff: str, 
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def kernel(surface: dict[str, Any], buffer: Any, data: dict[str, Any]) -> Any:
+    def kernel(surface: dict[str, Any], buffer: Any, reach: Any, data: dict[str, Any]) -> Any:
         t = types()
         pixel, point, hit = element(t, size, surface, buffer)
-        radius, bias, _, thickness = data["numbers"]
+        radius, bias, _, _ = data["numbers"]
         view = -point * dr.rsqrt(dr.squared_norm(point))
 
         def lines(way: Any) -> tuple[Any, Any, Any, Any]:
@@ -201,7 +206,7 @@ def _exposure(size: tuple[int, int], directions: int, steps: int, falloff: str, 
             du, dv = buffer.fx * scale * (way.x - x * way.z), buffer.fy * scale * (way.y - y * way.z)
             return x * buffer.fx + buffer.cx, y * buffer.fy + buffer.cy, du, dv
 
-        settings = radius, bias, horizon.noise(t, pixel), directions, steps, falloff, hit, thickness if thick else None
+        settings = radius, bias, horizon.noise(t, pixel), directions, steps, falloff, hit, reach
         return horizon.covered(t, buffer, size, point, surface["normal"], view, lines, *settings)
 
     return kernel

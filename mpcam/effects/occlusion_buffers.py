@@ -34,17 +34,52 @@ def checked_buffer(zbuffer: Any, hits: Hits) -> Hits:
     return zbuffer
 
 
+def checked_backs(backs: Any, buffers: list[Hits], thickness: float | None) -> list[Hits | None]:
+    """Hits on what is turned away from the z-buffers' cameras, one each; raises InputError for others."""
+    if backs is None:
+        return [None] * len(buffers)
+    given = list(backs) if isinstance(backs, (list, tuple)) else [backs]
+    if thickness is None:
+        raise InputError("backs need thickness=, a length: how far surfaces without a back reach, and others at most")
+    if len(given) != len(buffers):
+        raise InputError(f"backs has {len(given)} entries for {len(buffers)} z-buffers: give one for each, in order")
+    for back, front in zip(given, buffers, strict=True):
+        if not isinstance(back, Hits) or back.camera != front.camera:
+            raise InputError("backs: give hits of the z-buffers' own cameras, mpcam.rasterize(..., cull='front')")
+    return given
+
+
+def reaches_of(buffers: list[Hits], backs: list[Hits | None], thickness: float | None) -> list[Any]:
+    """How far each sample reaches back, in the device's lengths, a Float for each z-buffer; None: without end."""
+    import drjit as dr
+
+    t, found = types(), []
+    for front, back in zip(buffers, backs, strict=True):
+        if thickness is None:
+            found.append(None)
+            continue
+        (most, unit) = opaque_numbers([thickness / device_mesh(front.mesh).scale, 1.0 / device_mesh(front.mesh).scale])
+        reach = most + dr.zeros(t.Float, front.camera.width * front.camera.height)
+        if back is not None:
+            behind = (back.device_depth - front.device_depth) * unit
+            reach = dr.select(behind > 0, dr.minimum(behind, reach), reach)
+        dr.eval(reach)
+        found.append(reach)
+    return found
+
+
 def buffer_share(
     zbuffer: Hits,
     before: list[Hits],
     hits: Hits,
     own: tuple[dict[str, Any], Any, dict[str, Any]],
     settings: tuple[int, int, str],
-    thickness: float | None,
+    reach: Any,
 ) -> Any:
     """Share that a z-buffer's samples cover, of those that none before holds: a Float, one entry per pixel of hits.
 
     own: surface, buffer and numbers of the hits' own pinhole, in its frame; settings: directions, steps, falloff.
+    reach: of each of its samples, see `reaches_of`.
     """
     from mpcam_kernels.horizon import PointBuffer
 
@@ -55,9 +90,9 @@ def buffer_share(
         known = device_camera(other.camera).on_device
         points = _without(size, shape)(points, _points_of(other, hits), known, _pose(other, hits), data["numbers"])
     size, shape = ((one.camera.width, one.camera.height) for one in (hits, zbuffer))
-    kernel = _share(size, shape, *settings, thickness is not None)
+    kernel = _share(size, shape, *settings)
     camera = device_camera(zbuffer.camera).on_device
-    return kernel(surface, buffer, PointBuffer(points), camera, _pose(zbuffer, hits), data)
+    return kernel(surface, buffer, PointBuffer(points), reach, camera, _pose(zbuffer, hits), data)
 
 
 def _pose(zbuffer: Hits, hits: Hits) -> list[Any]:
@@ -132,9 +167,7 @@ def _without(size: tuple[int, int], shape: tuple[int, int]) -> Any:
 
 
 @functools.cache
-def _share(
-    size: tuple[int, int], shape: tuple[int, int], directions: int, steps: int, falloff: str, thick: bool
-) -> Any:
+def _share(size: tuple[int, int], shape: tuple[int, int], directions: int, steps: int, falloff: str) -> Any:
     """Kernel: share that another camera's samples cover."""
     import drjit as dr
 
@@ -144,11 +177,11 @@ def _share(
 
     @frozen
     def kernel(
-        surface: dict[str, Any], buffer: Any, samples: Any, camera: Any, pose: list[Any], data: dict[str, Any]
+        surface: dict[str, Any], buffer: Any, samples: Any, reach: Any, camera: Any, pose: list[Any], data: Any
     ) -> Any:
         t = types()
         pixel, point, hit = element(t, size, surface, buffer)
-        radius, bias, _, thickness = data["numbers"]
+        radius, bias, _, _ = data["numbers"]
         stride = radius * _STRIDE
 
         def image(place: Any) -> tuple[Any, Any, Any, Any]:
@@ -170,7 +203,7 @@ def _share(
         view = view * dr.rsqrt(dr.maximum(dr.squared_norm(view), 1e-30))
         there &= dr.squared_norm(view) > 0.5
         view = dr.select(there, dr.select(dr.dot(view, deeper) > 0, -view, view), t.Array3f(0, 0, -1))
-        if not thick:  # what only the hits' camera sees is looked at as from there
+        if reach is None:  # what only the hits' camera sees is looked at as from there
             behind = dr.dot(view, surface["normal"]) <= 0
             view = dr.select(behind, -point * dr.rsqrt(dr.squared_norm(point)), view)
 
@@ -178,8 +211,6 @@ def _share(
             return u, v, dr.dot(across, way) * radius, dr.dot(down, way) * radius
 
         settings = radius, bias, horizon.noise(t, pixel), directions, steps, falloff, there
-        return horizon.covered(
-            t, samples, shape, point, surface["normal"], view, lines, *settings, thickness if thick else None
-        )
+        return horizon.covered(t, samples, shape, point, surface["normal"], view, lines, *settings, reach)
 
     return kernel
