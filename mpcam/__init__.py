@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from mpcam.rendering.shade import shade as shade
     from mpcam.scene.builtin import builtin_scene as builtin_scene
     from mpcam.scene.mirror import Mirror as Mirror
+    from mpcam.scene.occlusion import Occlusion as Occlusion
     from mpcam.scene.refractor import Refractor as Refractor
     from mpcam.scene.scene import DirectionalLight as DirectionalLight
     from mpcam.scene.scene import PointLight as PointLight
@@ -152,6 +153,7 @@ _HOMES = {
     "mpcam.rendering.shade": "shade",
     "mpcam.scene.builtin": "builtin_scene",
     "mpcam.scene.mirror": "Mirror",
+    "mpcam.scene.occlusion": "Occlusion",
     "mpcam.scene.refractor": "Refractor",
     "mpcam.scene.scene": "DirectionalLight PointLight Scene",
 }

@@ -140,6 +140,7 @@ def render(
     shadows: bool = False,
     shadow_size: int | None = None,
     occlusion: float | None = None,
+    thickness: float | None = None,
     level: int | None = None,
     patch: int | None = None,
     resolution: int | None = None,
@@ -164,7 +165,9 @@ def render(
         shading: light, color, normal or texture.
         shadows: Let the scene's lights cast shadows, by a shadow map each.
         shadow_size: Pixels along a side of those; 1024 if not given.
-        occlusion: Radius, scene units, within which surfaces keep ambient light from each other; pinholes only.
+        occlusion: Radius, scene units, within which surfaces keep ambient light from each other, for pinholes; in
+            place of the scene's.
+        thickness: Scene units by which what is seen reaches back, for occlusion; without end if not given.
         level: Times that --method vertex halves each edge.
         patch: Samples along a side of each triangle, for --method two_pass.
         resolution: Pixels along a face of --method cubemap and hemicube, or along the short sides of camera triangles.
@@ -195,7 +198,12 @@ def render(
 
         print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))
         explain = False
-    options: dict[str, Any] = {"shading": shading, "shadows": shadows, "occlusion": occlusion, "explain": explain}
+    options: dict[str, Any] = {
+        "shading": shading,
+        "shadows": shadows,
+        "occlusion": _occlusion(loaded, occlusion, thickness),
+        "explain": explain,
+    }
     options["shadow_size"] = 1024 if shadow_size is None else shadow_size
     with Console(stderr=True).status(f"rendering {loaded.name}"):
         image, depth = image_and_depth(camera, loaded, method, layers, **options, **settings)
@@ -204,6 +212,20 @@ def render(
 
 for command in (decompose, fit, caustics, surround):
     app.command(command)
+
+
+def _occlusion(scene: Any, radius: float | None, thickness: float | None) -> Any:
+    """The scene's occlusion, with what the command line changes of it."""
+    from dataclasses import replace
+
+    from mpcam.scene.occlusion import Occlusion
+
+    known = scene.occlusion
+    if radius is not None:
+        known = Occlusion(radius) if known is None else replace(known, radius=radius)
+    if thickness is None or known is not None:
+        return known if thickness is None else replace(known, thickness=thickness)
+    raise InputError(f"--thickness {thickness:g} goes with --occlusion RADIUS: give that too")
 
 
 def _no_option(_: type, text: str | None) -> None:

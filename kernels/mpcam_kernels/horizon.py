@@ -3,6 +3,9 @@
 From the image of the point, lines run through the z-buffer. Each step gives a sample of a surface. What lies between
 its elevation above the plane at right angles to the view and that of the tangent plane in the same azimuth is covered.
 Azimuths are those of the sample itself, not of the line: it lies beside the line, at the middle of its pixel.
+
+With a thickness, a sample covers no more than what lies before it and so far behind it along the view; what is covered
+along a line is kept as a set of sectors, one bit each (Therrien, Levesque and Gilet 2023).
 """
 
 from collections.abc import Callable
@@ -12,6 +15,8 @@ from typing import Any
 import drjit as dr
 
 TURN = 6.283185307179586
+SECTORS = 32
+"""For each unit of the sine of the elevation, which runs over two of them."""
 FALLOFFS = ("quadratic", "linear", "none")
 
 
@@ -73,17 +78,20 @@ def covered(
     steps: int,
     falloff: str,
     active: Any,
+    thickness: Any = None,
 ) -> Any:
     """Share (Float, 0 to 1) of the solid angle above surfaces that nearer ones than a radius cover, by weight.
 
     size: width and height of the buffer's image. point, normal, view: Array3f; normal and view are of length 1, view
-    points to the eye, and normal . view > 0. lines: of a direction at right angles to the view, where its line starts
+    points to where the buffer is seen from. lines: of a direction at right angles to the view, where its line starts
     in the image and how far it runs within the radius (u, v, du, dv, pixels). spin: numbers from 0 to 1 by which lines
     are turned and steps are shifted. bias: sine of the angle above the tangent plane below which nothing counts.
-    falloff: one of FALLOFFS.
+    falloff: one of FALLOFFS. thickness: Float, one for each pixel of the buffer, how far its sample reaches back; None:
+    without end, which is for points with normal . view > 0 alone.
     """
     width, height = size
     facing = dr.dot(normal, view)
+    side = dr.select(facing >= 0, types.Float(1.0), -1.0)
     first, second = _across(types, view)
 
     def weight(distance: Any) -> Any:
@@ -101,9 +109,13 @@ def covered(
         # No farther than the image reaches.
         far = dr.minimum(length, float(width + height))
         du, dv = du / length, dv / length
+        # Ends of sectors are rounded up as often as they should be.
+        shift = _fraction(spin[1] + types.Float(number) * 0.618034)
 
-        def step(at: Any, high: Any, sum_: Any) -> Any:
-            place = 1.0 + (far - 1.0) * (types.Float(at) + spin[1]) / steps
+        def step(at: Any, known: Any, sum_: Any) -> Any:
+            part = (types.Float(at) + spin[1]) / steps
+            # What is near covers more, and a sample with an end covers nothing between it and the next one.
+            place = 1.0 + (far - 1.0) * (part if thickness is None else part * part)
             column, row = types.Int(dr.floor(u + place * du)), types.Int(dr.floor(v + place * dv))
             inside = good & (column >= 0) & (row >= 0) & (column < width) & (row < height)
             pixel = types.UInt(dr.select(inside, row * width + column, 0))
@@ -113,20 +125,43 @@ def covered(
             distance = dr.sqrt(squared)
             inside &= (above > bias * distance) & (distance < radius) & (squared > 0)
             # Sines of the elevations of the sample, and of the tangent plane in its azimuth.
-            tilt = above - up * facing
-            flat = dr.sqrt(tilt * tilt + facing * facing * dr.maximum(squared - up * up, 0.0))
-            rise = up / distance + tilt / dr.maximum(flat, 1e-30)
-            higher = inside & (rise > high)
-            more = weight(distance) * (rise - high)
-            return at + 1, dr.select(higher, rise, high), sum_ + dr.select(higher, more, 0.0)
+            tilt, level = above - up * facing, dr.maximum(squared - up * up, 0.0)
+            flat = side * tilt / dr.maximum(dr.sqrt(tilt * tilt + facing * facing * level), 1e-30)
+            rise = side * (up / distance + flat)
+            if thickness is None:
+                higher = inside & (rise > known)
+                more = weight(distance) * (rise - known)
+                return at + 1, dr.select(higher, rise, known), sum_ + dr.select(higher, more, 0.0)
+            deep = up - dr.gather(types.Float, thickness, pixel, inside)
+            behind = side * (deep * dr.rsqrt(dr.maximum(level + deep * deep, 1e-30)) + flat)
+            sectors = _sectors(types, dr.minimum(rise, behind), dr.maximum(rise, behind), shift)
+            fresh = dr.select(inside, sectors & ~known, types.UInt64(0))
+            more = weight(distance) * types.Float(dr.popcnt(fresh)) * (1.0 / SECTORS)
+            return at + 1, known | fresh, sum_ + dr.select(inside, more, 0.0)
 
-        state = (types.UInt(0), types.Float(0.0), types.Float(0.0))
-        *_, found = dr.while_loop(state, lambda at, high, sum_: at < steps, step)
+        nothing = types.Float(0.0) if thickness is None else types.UInt64(0)
+        state = (types.UInt(0), nothing, types.Float(0.0))
+        *_, found = dr.while_loop(state, lambda at, known, sum_: at < steps, step)
         return number + 1, total + found
 
     state = (types.UInt(0), types.Float(0.0))
     _, total = dr.while_loop(state, lambda number, total: number < directions, along)
     return dr.clip(total / directions, 0.0, 1.0)
+
+
+def _sectors(types: Any, low: Any, high: Any, shift: Any) -> Any:
+    """Bits (UInt64) of the sectors between two elevations above the tangent plane, from 0 to 2."""
+
+    def below(rise: Any) -> Any:
+        count = types.UInt(dr.clip(rise * SECTORS + shift, 0.0, 2.0 * SECTORS))
+        one = types.UInt64(1)
+        return dr.select(count >= 64, ~types.UInt64(0), (one << types.UInt64(dr.minimum(count, 63))) - one)
+
+    return below(high) & ~below(low)
+
+
+def _fraction(value: Any) -> Any:
+    return value - dr.floor(value)
 
 
 def _across(types: Any, view: Any) -> tuple[Any, Any]:

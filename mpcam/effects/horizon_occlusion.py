@@ -12,23 +12,21 @@ nothing of itself anywhere in the image, and a wall is right at every field of v
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
-from mpcam.cameras.capabilities import Projects, need
 from mpcam.cameras.pinhole import Pinhole
-from mpcam.checks import is_number, shown, whole_number
+from mpcam.effects.occlusion_buffers import buffer_share, checked_backs, checked_buffer, reaches_of
+from mpcam.effects.screen_elements import element
 from mpcam.errors import InputError
 from mpcam.rendering.device import device_mesh
-from mpcam.rendering.device_camera import device_camera
 from mpcam.rendering.hits import Hits
+from mpcam.scene.occlusion import Occlusion
 
-FALLOFFS = ("quadratic", "linear", "none")
-MOST_LINES = 1024
 _THICKNESS = 0.05  # of the radius: off the tangent plane, where the blur's weight has fallen to 1 / e
-_STRIDE = 0.02  # of the radius, along which the way of a line in another camera's image is found
 _UNBOUND = 1e6  # of the mesh's size: stands for an infinite radius
 
 
@@ -42,7 +40,9 @@ def screen_occlusion(
     falloff: str = "quadratic",
     bias: float = 0.05,
     blur: int = 21,
-    zbuffer: Hits | None = None,
+    zbuffer: Hits | Sequence[Hits] | None = None,
+    thickness: float | None = None,
+    backs: Hits | Sequence[Hits] | None = None,
 ) -> np.ndarray:
     """Exposure of what a pinhole camera's pixels see to light from everywhere: (H, W) float32, 1 where nothing is hit.
 
@@ -51,15 +51,19 @@ def screen_occlusion(
     weight of what covers at a distance r, "quadratic" 1 - (r / radius)^2, "linear" 1 - r / radius, or "none". bias:
     radians above the tangent plane below which nothing counts. blur: pixels along a side of the blur that evens out the
     noise within surfaces, odd, 1 for none. zbuffer: hits on the same mesh by another camera whose samples are walked in
-    place of the frame's own: one that sees more, and whose lines of the image are images of planes, such as a wider
-    Pinhole or a graph camera; any camera with one image of each point is taken. Lines are turned and steps shifted by
-    the pixel's own numbers, the same every time. Raises InputError.
+    place of the frame's own, such as a wider Pinhole or a graph camera; any camera with one image of each point is
+    taken. Or several, of which each adds what those before it do not hold; with thickness alone, hits themselves may be
+    among them. thickness: scene units by which what is seen reaches back from the eye; the gaps behind are open. None:
+    it reaches back without end. Lines are turned and steps shifted by the pixel's own numbers, the same every time.
+    Raises InputError.
 
-    What the camera does not see covers nothing, and what it sees covers all that is behind it; the exposure is by solid
-    angle, as `ambient_occlusion(weight="uniform")`, which is exact, and slow.
+    What no z-buffer holds covers nothing. The exposure is by solid angle, as `ambient_occlusion(weight="uniform")`,
+    which is exact, and slow.
     """
     settings: dict[str, Any] = {"directions": directions, "steps": steps, "falloff": falloff, "bias": bias}
-    exposure = screen_occlusion_device(hits, radius, blur=blur, zbuffer=zbuffer, **settings)
+    exposure = screen_occlusion_device(
+        hits, radius, blur=blur, zbuffer=zbuffer, thickness=thickness, backs=backs, **settings
+    )
     return np.asarray(exposure.numpy()).reshape(hits.camera.height, hits.camera.width)
 
 
@@ -73,7 +77,9 @@ def screen_occlusion_device(
     falloff: str = "quadratic",
     bias: float = 0.05,
     blur: int = 21,
-    zbuffer: Hits | None = None,
+    zbuffer: Hits | Sequence[Hits] | None = None,
+    thickness: float | None = None,
+    backs: Hits | Sequence[Hits] | None = None,
 ) -> Any:
     """As `screen_occlusion`, but it stays on the device: an evaluated Float, one entry per pixel."""
     import drjit as dr
@@ -82,13 +88,9 @@ def screen_occlusion_device(
     if not isinstance(hits, Hits):
         raise InputError(f"hits is a {type(hits).__name__}: give hits, mpcam.rasterize(pinhole, scene)")
     camera = check_screen(hits.camera)
-    lines = whole_number("directions", directions, 1, MOST_LINES), whole_number("steps", steps, 1, MOST_LINES)
-    length = checked_lengths(radius, falloff)
-    if not is_number(bias) or not 0 <= bias < 0.5 * math.pi:
-        raise InputError(f"bias={shown(bias)}: radians from 0 to below pi / 2 are needed")
-    window = whole_number("blur", blur, 1, 255, unit="pixels")
-    if window % 2 == 0:
-        raise InputError(f"blur={blur}: an odd number of pixels is needed, so that it has a middle")
+    given = Occlusion(radius, thickness, directions, steps, falloff, bias, blur)
+    lines, length, window = (directions, steps), float(radius), blur
+    back, buffers = given.thickness, _checked_buffers(hits, zbuffer, thickness)
     count = camera.width * camera.height
     if hits.mesh.triangle_count == 0:
         return dr.ones(t.Float, count)
@@ -100,17 +102,20 @@ def screen_occlusion_device(
         "vertices": device.vertices,
         "pose": opaque_numbers([*pose.ravel()]),
         "camera": opaque_numbers([camera.fx, camera.fy, camera.cx, camera.cy, 1.0 / device.scale]),
-        "numbers": opaque_numbers([length, math.sin(bias), _THICKNESS * length]),
+        "numbers": opaque_numbers([length, math.sin(bias), _THICKNESS * length, (back or 0.0) / device.scale]),
     }
     size = (camera.width, camera.height)
     surface = _surfaces(size)(hits.device_triangle, hits.device_depth, data)
     buffer = _planar(surface["z"], data)
-    if zbuffer is None:
-        exposure = _exposure(size, size, *lines, falloff)(surface, buffer, buffer, None, data)
-    else:
-        other, samples = _other(zbuffer, hits, device, data)
-        shape = (zbuffer.camera.width, zbuffer.camera.height)
-        exposure = _exposure(size, shape, *lines, falloff)(surface, buffer, samples, other, data)
+    reaches = reaches_of(buffers, checked_backs(backs, buffers, back), back)
+    exposure = dr.ones(t.Float, count)
+    for number, (other, reach) in enumerate(zip(buffers, reaches, strict=True)):
+        if other is hits:
+            share = _exposure(size, *lines, falloff)(surface, buffer, reach, data)
+        else:
+            share = buffer_share(other, buffers[:number], hits, (surface, buffer, data), (*lines, falloff), reach)
+        exposure = exposure * (1.0 - share)
+        dr.eval(exposure)
     if window > 1:
         for step in ((1, 0), (0, 1)):
             exposure = _blur(size, step, window // 2)(exposure, surface, buffer, data)
@@ -124,15 +129,20 @@ def check_screen(camera: Any) -> Pinhole:
     return camera
 
 
-def checked_lengths(radius: Any, falloff: Any) -> float:
-    """The radius, where it and the falloff are what they should be."""
-    if not (is_number(radius) and radius > 0) and not (isinstance(radius, float) and radius == math.inf):
-        raise InputError(f"radius={shown(radius)}: give a length above 0 in scene units, or math.inf")
-    if falloff not in FALLOFFS:
-        raise InputError(f"falloff={shown(falloff)}: allowed are {', '.join(FALLOFFS)}")
-    if falloff != "none" and radius == math.inf:
-        raise InputError(f"falloff={falloff!r} needs a radius that is not infinite: give one, or falloff='none'")
-    return float(radius)
+def _checked_buffers(hits: Hits, zbuffer: Any, thickness: float | None) -> list[Hits]:
+    """The z-buffers that are walked, in order."""
+    if zbuffer is None:
+        return [hits]
+    if not isinstance(zbuffer, (list, tuple)):
+        return [checked_buffer(zbuffer, hits)]
+    if not zbuffer or (thickness is None and len(zbuffer) > 1):
+        raise InputError(
+            f"zbuffer has {len(zbuffer)} entries: several need thickness=, a length, since what reaches back without "
+            "end from one eye hides what the others see"
+            if zbuffer
+            else "zbuffer is empty: give hits of a camera, or None for the frame's own"
+        )
+    return [checked_buffer(one, hits) for one in zbuffer]
 
 
 def _planar(z: Any, data: dict[str, Any]) -> Any:
@@ -176,118 +186,28 @@ def _surfaces(size: tuple[int, int]) -> Any:
     return kernel
 
 
-def _element(t: Any, size: tuple[int, int], surface: dict[str, Any], buffer: Any) -> tuple[Any, Any, Any]:
-    """Pixel numbers, points and whether there is one."""
-    import drjit as dr
-
-    pixel = dr.arange(t.UInt, size[0] * size[1])
-    row = pixel // size[0]
-    hit = surface["z"] < dr.inf
-    z = dr.select(hit, surface["z"], 1.0)
-    x = (t.Float(pixel - row * size[0]) + 0.5 - buffer.cx) / buffer.fx
-    y = (t.Float(row) + 0.5 - buffer.cy) / buffer.fy
-    return pixel, t.Array3f(x * z, y * z, z), hit
-
-
-def _other(zbuffer: Any, hits: Hits, device: Any, data: dict[str, Any]) -> tuple[Any, Any]:
-    """Another camera as kernels take it, with the pose to its frame from that of the hits' camera, and its samples."""
-    import drjit as dr
-
-    from mpcam_kernels.horizon import PointBuffer
-
-    if not isinstance(zbuffer, Hits):
-        raise InputError(f"zbuffer is a {type(zbuffer).__name__}: give hits of another camera, mpcam.rasterize(...)")
-    camera = zbuffer.camera
-    need(camera, Projects, "zbuffer")
-    if camera.images_per_point != 1:
-        raise InputError(f"zbuffer needs one image for each point, and a {type(camera).__name__} may have more")
-    if device_mesh(zbuffer.mesh) is not device:
-        raise InputError("zbuffer is of another mesh: rasterize the same one by both cameras")
-    own = np.asarray(hits.camera.camera_from_world, np.float64)
-    eye = np.linalg.inv(own)[:3, 3]
-    # To the hits' camera from the device's frame, and to the other camera's frame from there, in scene units.
-    shift = (own[:3, :3] @ device.anchor + own[:3, 3]) / device.scale
-    place = np.asarray(camera.camera_from_world, np.float64)
-    turn = place[:3, :3] @ own[:3, :3].T
-    away = place[:3, :3] @ eye + place[:3, 3]
-    data["shift"] = opaque_numbers([*shift])
-    data["other"] = opaque_numbers([*turn.ravel(), *away, device.scale])
-    points = dr.ravel(_points()(zbuffer.device_triangle, zbuffer.device_weights, data))
-    dr.eval(points)
-    return device_camera(camera).on_device, PointBuffer(points)
-
-
 @functools.cache
-def _points() -> Any:
-    """Kernel: what another camera's pixels see, in the frame of the hits' camera; z is infinite for nothing."""
-    import drjit as dr
-
-    from mpcam_kernels.frozen import frozen
-
-    @frozen
-    def kernel(triangle: Any, weights: tuple[Any, Any], data: dict[str, Any]) -> Any:
-        t, hit = types(), triangle >= 0
-        corners = dr.gather(t.Array3u, data["faces"], t.UInt(dr.maximum(triangle, 0)), hit)
-        a, b, c = (dr.gather(t.Array3f, data["vertices"], corner, hit) for corner in corners)
-        world = a + (b - a) * weights[0] + (c - a) * weights[1]
-        pose, shift = data["pose"], data["shift"]
-        rows = [pose[3 * i] * world.x + pose[3 * i + 1] * world.y + pose[3 * i + 2] * world.z for i in range(3)]
-        x, y, z = (row + part for row, part in zip(rows, shift, strict=True))
-        return t.Array3f(x, y, dr.select(hit, z, dr.inf))
-
-    return kernel
-
-
-@functools.cache
-def _exposure(size: tuple[int, int], shape: tuple[int, int], directions: int, steps: int, falloff: str) -> Any:
-    """Kernel: exposure by a z-buffer of a shape, the pinhole's own or another camera's."""
+def _exposure(size: tuple[int, int], directions: int, steps: int, falloff: str) -> Any:
+    """Kernel: share that is covered by what the pinhole sees itself."""
     import drjit as dr
 
     from mpcam_kernels import horizon
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def kernel(surface: dict[str, Any], buffer: Any, samples: Any, other: Any, data: dict[str, Any]) -> Any:
+    def kernel(surface: dict[str, Any], buffer: Any, reach: Any, data: dict[str, Any]) -> Any:
         t = types()
-        pixel, point, hit = _element(t, size, surface, buffer)
-        radius, bias, _ = data["numbers"]
+        pixel, point, hit = element(t, size, surface, buffer)
+        radius, bias, _, _ = data["numbers"]
         view = -point * dr.rsqrt(dr.squared_norm(point))
 
-        def own(way: Any) -> tuple[Any, Any, Any, Any]:
+        def lines(way: Any) -> tuple[Any, Any, Any, Any]:
             x, y, scale = point.x / point.z, point.y / point.z, radius / point.z
             du, dv = buffer.fx * scale * (way.x - x * way.z), buffer.fy * scale * (way.y - y * way.z)
             return x * buffer.fx + buffer.cx, y * buffer.fy + buffer.cy, du, dv
 
-        def seen(place: Any) -> tuple[Any, Any, Any]:
-            pose = data["other"]
-            rows = [sum(pose[3 * i + j] * place[j] for j in range(3)) * pose[12] + pose[9 + i] for i in range(3)]
-            (u, v), _, valid = other.local_project(t.Array3f(*rows))[0]
-            return u, v, valid
-
-        def elsewhere(way: Any) -> tuple[Any, Any, Any, Any]:
-            u, v, there = seen(point)
-            ahead, down, near = seen(point + way * (radius * _STRIDE))
-            there &= near
-            stretch = dr.select(there, 1.0 / _STRIDE, 0.0)
-            return u, v, dr.select(there, ahead - u, 0.0) * stretch, dr.select(there, down - v, 0.0) * stretch
-
-        share = horizon.covered(
-            t,
-            samples,
-            shape,
-            point,
-            surface["normal"],
-            view,
-            own if other is None else elsewhere,
-            radius,
-            bias,
-            horizon.noise(t, pixel),
-            directions,
-            steps,
-            falloff,
-            hit,
-        )
-        return dr.select(hit, 1.0 - share, 1.0)
+        settings = radius, bias, horizon.noise(t, pixel), directions, steps, falloff, hit, reach
+        return horizon.covered(t, buffer, size, point, surface["normal"], view, lines, *settings)
 
     return kernel
 
@@ -301,7 +221,7 @@ def _blur(size: tuple[int, int], step: tuple[int, int], reach: int) -> Any:
     @frozen
     def kernel(values: Any, surface: dict[str, Any], buffer: Any, data: dict[str, Any]) -> Any:
         t = types()
-        pixel, point, hit = _element(t, size, surface, buffer)
+        pixel, point, hit = element(t, size, surface, buffer)
         thickness = data["numbers"][2]
         return horizon.blurred(t, values, buffer, size, pixel, point, surface["normal"], step, reach, thickness, hit)
 

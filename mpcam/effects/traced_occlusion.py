@@ -7,11 +7,11 @@ import numpy as np
 
 from mpcam.backend import exclusive, opaque_numbers, types
 from mpcam.checks import whole_number
-from mpcam.effects.horizon_occlusion import checked_lengths
 from mpcam.effects.occlusion import OFFSET
 from mpcam.errors import InputError
 from mpcam.rendering.device import device_mesh
 from mpcam.rendering.hits import Hits
+from mpcam.scene.occlusion import checked_lengths
 
 _GOLDEN = math.pi * (3.0 - 5.0**0.5)  # turn from one point of the spiral to the next
 MOST_RAYS = 1 << 20

@@ -110,5 +110,20 @@ EXPERIMENTS = {
             "fit_hou2006_fig6",
             "The mirrors of Hou et al. 2006, Fig. 6, by fitted camera triangles: pictures as good with how many fewer",
         ),
+        Experiment(
+            "rosen2011-fig17-fig19",
+            "rosen2011_fig17_fig19",
+            "Rosen et al. 2011, Figs. 17 and 19: steps of rays over depth images, with and without coarse steps",
+        ),
+        Experiment(
+            "rosen2011-ambient-occlusion",
+            "rosen2011_ambient_occlusion",
+            "Rosen et al. 2011, Fig. 3: ambient occlusion by the output's z-buffer and by ones that see more",
+        ),
+        Experiment(
+            "rosen2011-table1",
+            "rosen2011_table1",
+            "Rosen et al. 2011, Table 1: time of a reflection by output, fine step, depth image, coarse step; memory",
+        ),
     )
 }

@@ -19,13 +19,13 @@ from mpcam.effects.missing_samples import held, on_device, true_hits
 from mpcam.effects.reflection import Reflection
 from mpcam.experiments.common import WARMUP, machine, measured, rounds
 from mpcam.experiments.results import Column, Gallery, Picture, Plot, Report, Table
+from mpcam.experiments.rosen2011_paper import PAPER
 from mpcam.experiments.rosen2011_scenes import reflection_scene
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.moved import moved
 from mpcam.scene.scene import Scene
 
 ROUNDS = 9
-PAPER = "Rosen, Popescu, Hayward, Wyman: Non-Pinhole Approximations for Interactive Rendering, IEEE TVCG 17 (10), 2011"
 PINHOLE, POLE, CHOSEN, TRACE = "pinhole", "single pole", "single pole, chosen", "Mitsuba"
 LAYERS = (2, 3, 4)
 Rows = list[dict[str, Any]]

@@ -13,8 +13,16 @@ from mpcam.io.scene_camera import build_camera, default_camera
 from mpcam.io.scene_mirror import build_mirror, build_refractor
 from mpcam.io.scene_place import color, placement
 from mpcam.io.scene_relief import build_relief, source_mesh
-from mpcam.io.scene_tables import DirectionalTable, EnvironmentTable, MeshTable, PointTable, SceneTable
+from mpcam.io.scene_tables import (
+    DirectionalTable,
+    EnvironmentTable,
+    MeshTable,
+    OcclusionTable,
+    PointTable,
+    SceneTable,
+)
 from mpcam.io.scene_text import SceneText
+from mpcam.scene.occlusion import Occlusion
 from mpcam.scene.scene import DirectionalLight, Light, PointLight, Scene
 
 
@@ -49,6 +57,7 @@ def build_scene(table: SceneTable, folder: Path, name: str, text: SceneText) -> 
         refractor=None if table.refractor is None else build_refractor(table.refractor, folder, text),
         environment=None if table.environment is None else _environment(table.environment, folder, text),
         reliefs=reliefs,
+        occlusion=None if table.occlusion is None else _occlusion(table.occlusion, text),
     )
 
 
@@ -58,6 +67,12 @@ def bounds_of(meshes: tuple[Mesh, ...]) -> np.ndarray:
     if not boxes:
         return np.zeros((2, 3))
     return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
+def _occlusion(table: OcclusionTable, text: SceneText) -> Occlusion:
+    fields = {name: getattr(table, name) for name in ("thickness", "directions", "steps", "falloff", "blur")}
+    with text.at("occlusion"):
+        return Occlusion(table.radius, **fields)
 
 
 def _environment(table: EnvironmentTable, folder: Path, text: SceneText) -> Any:

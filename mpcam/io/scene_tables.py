@@ -139,6 +139,17 @@ class EnvironmentTable(Table, frozen=True):
     size: Annotated[int, Meta(ge=8, le=16384)] | None = None  # pixels along a side of the two views kept of it
 
 
+class OcclusionTable(Table, frozen=True):
+    """[occlusion]: how surfaces keep ambient light from each other, in pictures by pinhole cameras."""
+
+    radius: Positive  # within which they do
+    thickness: Positive | None = None  # how far what is seen reaches back; default: without end
+    directions: Annotated[int, Meta(ge=1, le=1024)] = 6  # lines from each pixel
+    steps: Annotated[int, Meta(ge=1, le=1024)] = 6  # along each
+    falloff: Literal["quadratic", "linear", "none"] = "quadratic"  # weight by distance
+    blur: Annotated[int, Meta(ge=1, le=255)] = 21  # pixels along a side, odd
+
+
 class DirectionalTable(Table, tag_field="type", tag="directional", frozen=True):
     """[[light]] type = "directional": direction is the way that the light travels."""
 
@@ -216,6 +227,7 @@ class SceneTable(Table, frozen=True):
     mirror: MirrorTable | None = None
     refractor: RefractorTable | None = None
     environment: EnvironmentTable | None = None
+    occlusion: OcclusionTable | None = None
     relief: list[ReliefTable] = []
     compare: CompareTable = CompareTable()
     name: str | None = None

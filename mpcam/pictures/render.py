@@ -1,6 +1,7 @@
 """`render`: an image of a scene, with or without a mirror, by any method."""
 
 import sys
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from mpcam.errors import InputError
 from mpcam.pictures.explain import explain as explained
 from mpcam.rendering.methods import rasterize
 from mpcam.rendering.shade import shade
+from mpcam.scene.occlusion import Occlusion
 from mpcam.scene.scene import Scene
 
 
@@ -28,7 +30,7 @@ def render(
     shading: str = "light",
     shadows: bool = False,
     shadow_size: int = 1024,
-    occlusion: float | None = None,
+    occlusion: float | Occlusion | None = None,
     explain: bool = False,
     **settings: Any,
 ) -> np.ndarray:
@@ -37,14 +39,15 @@ def render(
     scene: a Scene, a Mesh or several meshes. shading: "color", "normal", "texture" or "light" (see `shade`). shadows:
     whether the scene's lights cast shadows, by a shadow map each (see `shadow_map`) that is tested per pixel; for
     shading "light". shadow_size: pixels along a side of those. occlusion: the radius, scene units, within which
-    surfaces keep ambient light from each other, by the frame's own depths (see `screen_occlusion`); for Pinhole cameras
-    and shading "light". method and settings: see `rasterize`. To render many frames of a still scene, make the maps
-    once and give them to `shade`. A scene with a mirror is shown with what is seen in it: by camera triangles with
-    method "invert", by its vertices' images with "vertex", by rays of the true surface with "raytrace", by those rays
-    and depth images with "depth_image", or by an "environment" map; for the settings, and for many frames, see
-    `Reflection`. Through a refractor the rest is seen by "depth_image", which is "invert" too, "environment" or
-    "raytrace"; see `Refraction`. A scene with reliefs is shown with them, by any method for the rest; for many frames
-    see `ReliefPicture`. explain: print to standard error which stages run, which are left out and why (see
+    surfaces keep ambient light from each other, by the frame's own depths (see `screen_occlusion`), or an `Occlusion`;
+    default the scene's. For Pinhole cameras and shading "light". method and settings: see `rasterize`. To render many
+    frames of a still scene, make the maps once and give them to `shade`. A scene with a mirror is shown with what is
+    seen in it: by camera triangles with method "invert", by its vertices' images with "vertex", by rays of the true
+    surface with "raytrace", by those rays and depth images with "depth_image", or by an "environment" map; for the
+    settings, and for many frames, see `Reflection`. Through a refractor the rest is seen by "depth_image", which is
+    "invert" too, "environment" or "raytrace"; see `Refraction`. A scene with reliefs is shown with them, by any method
+    for the rest; for many frames see `ReliefPicture`. explain: print to standard error which stages run, which are left
+    out and why (see
     `mpcam.explain`). Raises InputError.
     """
     named: dict[str, Any] = {"shading": shading, "shadows": shadows, "shadow_size": shadow_size}
@@ -60,12 +63,16 @@ def image_and_depth(
     shading: str,
     shadows: bool,
     shadow_size: int,
-    occlusion: float | None,
+    occlusion: float | Occlusion | None,
     explain: bool,
     **settings: Any,
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The same as `render`, and if wanted the distances (H, W) along the rays; None with a mirror or a refractor."""
     whole = Scene.of(scene)
+    if occlusion is None:
+        occlusion = whole.occlusion
+    elif not isinstance(occlusion, Occlusion):
+        occlusion = Occlusion(occlusion)
     seen_on = "mirror" if whole.mirror is not None else "refractor" if whole.refractor is not None else ""
     if seen_on and occlusion is not None:
         raise InputError(f"occlusion is not known for scenes with a {seen_on}: leave one of them out")
@@ -89,7 +96,7 @@ def image_and_depth(
         picture = ReliefPicture(whole, camera, method, shading=shading, shadows=maps, **settings)
         return picture.image(), picture.depth() if depth else None
     hits = rasterize(camera, whole.mesh, method, **settings)
-    exposure = None if occlusion is None else screen_occlusion_device(hits, occlusion)
+    exposure = None if occlusion is None else screen_occlusion_device(hits, **asdict(occlusion))
     return shade(hits, whole, shading, maps, exposure), hits.depth if depth else None
 
 

@@ -11,6 +11,7 @@ from mpcam.checks import number_table, shown
 from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.scene.mirror import Mirror
+from mpcam.scene.occlusion import Occlusion
 from mpcam.scene.refractor import Refractor
 
 Vector = tuple[float, float, float]
@@ -64,8 +65,9 @@ class Scene:
     linear RGB. mirror: a curved surface in which `render` and `reflection` show the rest. refractor: a thing of glass
     through which `render` and `refraction` do; a scene has one of the two at most. environment: an
     EnvironmentMap that rays see which miss everything, in place of the background. reliefs: one ReliefInstances or
-    several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. Raises InputError
-    where a field has the wrong kind.
+    several, which `render`, `ReliefPicture` and shadow maps show beside the meshes, and nothing else. occlusion: how
+    surfaces keep ambient light from each other in what `render` shows. Raises InputError where a field has the wrong
+    kind.
     """
 
     meshes: tuple[Mesh, ...]
@@ -78,6 +80,7 @@ class Scene:
     environment: Any = None
     reliefs: tuple[Any, ...] = ()
     refractor: Refractor | None = None
+    occlusion: Occlusion | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "meshes", _several(self.meshes, Mesh, "meshes", "Mesh"))
@@ -92,6 +95,8 @@ class Scene:
             raise InputError("a scene with a mirror and a refractor: neither shows the other, leave one of them out")
         if self.environment is not None and not hasattr(self.environment, "on_device"):
             raise InputError(f"scene environment is a {type(self.environment).__name__}: give an mpcam.EnvironmentMap")
+        if self.occlusion is not None and not isinstance(self.occlusion, Occlusion):
+            raise InputError(f"scene occlusion is a {type(self.occlusion).__name__}: give mpcam.Occlusion(radius)")
         reliefs = self.reliefs if isinstance(self.reliefs, (list, tuple)) else (self.reliefs,)
         for one in reliefs:
             if not hasattr(one, "placements"):
