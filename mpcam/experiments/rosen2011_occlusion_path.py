@@ -30,8 +30,8 @@ TURN = 60.0
 """Degrees by which the two views from aside are turned around the statue."""
 NEAR = 0.99
 """Pixels of less true exposure than this count: elsewhere nothing is to be found out."""
-SAME_POINT = 0.04
-"""Scene units by which a point may be off what its pixel sees, for it to be seen there."""
+SAME_POINT = 0.08
+"""Scene units by which a point may be off what the four pixels around it see, for it to be seen there."""
 HELD = 0.06
 """Scene units off a z-buffer's depth within which it holds a point: backs of thin limbs count with their fronts."""
 EVERY = 7
@@ -179,14 +179,21 @@ class Flicker:
     def add(self, hits: Hits, found: dict[tuple[str, str], np.ndarray]) -> None:
         """Another frame; where a point is hidden or out of sight there is no value."""
         camera: Any = hits.camera
-        pixel = camera.project(self.points).pixel[..., 0, :]
-        place = np.clip(np.floor(pixel).astype(int), 0, (camera.width - 1, camera.height - 1))
-        inside = (pixel >= 0).all(-1) & (pixel < (camera.width, camera.height)).all(-1)
-        row, column = place[:, 1], place[:, 0]
-        seen = hits.points[row, column]
-        seen = inside & hits.mask[row, column] & (np.linalg.norm(seen - self.points, axis=-1) < SAME_POINT)
+        size = np.array((camera.width, camera.height))
+        place = camera.project(self.points).pixel[..., 0, :] - 0.5
+        seen = (place >= 0).all(-1) & (place < size - 1).all(-1)
+        first = np.clip(np.floor(place), 0, size - 2).astype(int)
+        part = np.clip(place - first, 0, 1)
+        corners = []
+        for right, below in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            column, row = first[:, 0] + right, first[:, 1] + below
+            weight = np.where(right, part[:, 0], 1 - part[:, 0]) * np.where(below, part[:, 1], 1 - part[:, 1])
+            near = np.linalg.norm(hits.points[row, column] - self.points, axis=-1) < SAME_POINT
+            seen &= hits.mask[row, column] & near
+            corners.append((row, column, weight))
         for key, exposure in found.items():
-            values = np.where(seen, exposure[row, column], np.nan)
+            mixed = sum(weight * exposure[row, column] for row, column, weight in corners)
+            values = np.where(seen, mixed, np.nan)
             if key in self.last:
                 self.changes.setdefault(key, []).append(float(np.nanmean(np.abs(values - self.last[key]))))
             self.last[key] = values
