@@ -198,13 +198,9 @@ def render(
 
         print(explained(camera, loaded, method, shading=shading, shadows=shadows, **settings))
         explain = False
-    options: dict[str, Any] = {
-        "shading": shading,
-        "shadows": shadows,
-        "occlusion": _occlusion(loaded, occlusion, thickness),
-        "explain": explain,
-        "shadow_size": 1024 if shadow_size is None else shadow_size,
-    }
+    options: dict[str, Any] = {"shading": shading, "shadows": shadows, "explain": explain}
+    options["occlusion"] = _occlusion(loaded, occlusion, thickness)
+    options["shadow_size"] = 1024 if shadow_size is None else shadow_size
     with Console(stderr=True).status(f"rendering {loaded.name}"):
         image, depth = image_and_depth(camera, loaded, method, layers, **options, **settings)
         write_image(output, image, depth=depth, camera=camera if layers else None)
