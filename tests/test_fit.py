@@ -95,11 +95,16 @@ def test_held_out_pixels_are_not_fitted():
     assert not set(map(tuple, point.fitted.points)) & set(map(tuple, point.held_out.points))
 
 
-@pytest.mark.parametrize("kind", ["reflection", "refraction", "direct"])
+@pytest.mark.parametrize("kind", ["reflection", "refraction", "direct", "quadratic"])
 def test_slopes_are_those_of_the_cost(kind):
     """Against central differences of the cost, in all of a node's six numbers; samples beyond the border left out."""
     cams = mp.decompose(
-        WAVE, EYE, 24, index=1.4 if kind == "refraction" else None, mode="directions" if kind == "direct" else "normals"
+        WAVE,
+        EYE,
+        24 if kind != "quadratic" else 12,
+        index=1.4 if kind == "refraction" else None,
+        mode="directions" if kind == "direct" else "normals",
+        degree=2 if kind == "quadratic" else 1,
     )
     whole = reflector_of(WAVE)
     state = state_of(cams, whole, split_samples(whole, EYE, 1500, 100, 0).fitted, 1500)
@@ -137,7 +142,7 @@ def test_what_is_fixed_stays(start, fitted):
     count = len(start.vertices)
     result = mp.fit(start, reflector=SPHERE, eye=EYE, **SMALL, fixed={"positions": True})
     assert np.abs(result.camera.vertices - start.vertices).max() < 1e-15
-    assert 1.3 < result.gain < fitted.gain
+    assert 1.3 < result.gain and fitted.near.rms < 0.5 * result.near.rms
     mask = np.arange(count) % 2 == 0
     result = mp.fit(start, reflector=SPHERE, eye=EYE, **SMALL, fixed=mask)
     moved = np.abs(result.camera.vertices - start.vertices).max(axis=1)

@@ -87,7 +87,7 @@ def test_two_steps_from_the_closed_form_end_at_the_image(direct, name, share):
     face = rng.choice(faces, 4000)
     weights = rng.dirichlet([1, 1, 1], 4000)
     distance = rng.uniform(0.2, 6.0, 4000)
-    places, rays = (tuple(cams.corners(i)[k][:, face] for i in range(3)) for k in range(2))
+    places, rays = (tuple(cams.node(i)[k][:, face] for i in range(3)) for k in range(2))
     origin = sum(w * p for w, p in zip(weights.T, places, strict=True))
     along = sum(w * r for w, r in zip(weights.T, rays, strict=True))
     point = origin + distance * along
@@ -151,7 +151,7 @@ def test_every_point_has_its_image_by_the_steps_or_by_the_cubic(fitted, name):
         rng.dirichlet([1, 1, 1], 3000),
         rng.uniform(0.1, 9, 3000),
     )
-    places, rays = (tuple(cams.corners(i)[k][:, face] for i in range(3)) for k in range(2))
+    places, rays = (tuple(cams.node(i)[k][:, face] for i in range(3)) for k in range(2))
     point = sum(w * (p + distance * r) for w, p, r in zip(weights.T, places, rays, strict=True))
     two, every = near_image(places, rays, point), nearest_image(places, rays, point)
     assert 0.5 < (two.residual < 1e-6).mean() < 0.99
@@ -176,7 +176,7 @@ def test_in_their_own_planes_the_closed_form_is_exact(direct):
         warnings.simplefilter("ignore")
         cams = in_own_planes(direct["wave"])
     assert cams.linear and np.isclose(slants(cams) > 0, slants(cams)[:1] > 0).all()
-    places, rays = (tuple(cams.corners(i)[k] for i in range(3)) for k in range(2))
+    places, rays = (tuple(cams.node(i)[k] for i in range(3)) for k in range(2))
     point = sum(places) / 3 + 2.0 * sum(rays) / 3
     assert near_image(places, rays, point, steps=0).residual.max() < 1e-12
 

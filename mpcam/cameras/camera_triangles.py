@@ -10,8 +10,9 @@ from mpcam.cameras.atlas import Atlas, atlas
 from mpcam.cameras.base import Camera, register_pytrees
 from mpcam.cameras.general_linear_map import linear_numbers
 from mpcam.cameras.linear_pieces import LinearPieces
+from mpcam.cameras.triangle_nodes import NODES, mixed
 from mpcam.cameras.types import Domain, Projection, Ray
-from mpcam.checks import three_numbers
+from mpcam.checks import three_numbers, whole_number
 from mpcam.errors import InputError
 from mpcam.math import Array, Vector, cross, dot, isfinite, library, normalize, plain, take, vector, where
 from mpcam.math.optics import reflect, refract
@@ -22,16 +23,20 @@ SCALES = ("unit", "plane", "near_far")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CameraTriangles(Camera):
-    """Rays that run from the triangles of a mesh; over each triangle their origins are linear.
+    """Rays that run from the triangles of a mesh; over each triangle their origins are linear, or quadratic.
 
     Direct: `directions` at the vertices; over a triangle the direction is their barycentric mean (Hou et al. 2006,
     eq. 1). Reflection and refraction: `normals` at the vertices and an `eye`; each pixel interpolates its normal and
     bends the ray from the eye there (sections 3.1 and 3.2). The image is an atlas with a right triangle for each camera
-    triangle, two to a cell; pixels between them have no ray.
+    triangle, two to a cell; pixels between them have no ray. degree 2: a triangle has a vertex more on each edge, and
+    positions and directions, or normals, are quadratic in between: curved triangles that share the vertices of an edge
+    still share all its rays.
 
     vertices (V, 3), directions (V, 3), normals (V, 3), eye (3,): camera frame, which is the world unless
     camera_from_world says otherwise; scene units, directions and normals of any length but zero. faces (F, 3): vertex
-    numbers. resolution: pixels along the short sides of each triangle in the image, one number >= 2 or F of them.
+    numbers; for degree 2 (F, 6), after the corners 1, 2 and 3 the vertices on the edges 2-3, 3-1 and 1-2, whose values
+    are those halfway along the edge. resolution: pixels along the short sides of each triangle in the image, one number
+    >= 2 or F of them.
     ray_scale, for directions: "unit" (normalized at the vertices, as the paper has it), "plane" (equal parts along the
     triangle's normal: then pinholes and general linear cameras are met exactly, but rays of neighbors on a common edge
     differ unless the two lie in one plane) or "near_far" (lengths as given: vertices to vertices + directions, the
@@ -48,14 +53,16 @@ class CameraTriangles(Camera):
     ray_scale: str = "unit"
     index: Any = None
     camera_from_world: Any = None
+    degree: int = 1
 
-    static_fields: ClassVar[tuple[str, ...]] = ("faces", "resolution", "ray_scale")
+    static_fields: ClassVar[tuple[str, ...]] = ("faces", "resolution", "ray_scale", "degree")
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "camera_from_world", as_pose(self.camera_from_world))
         set_(self, "vertices", _table(self.vertices, "vertices"))
-        set_(self, "faces", _faces(self.faces, len(self.vertices)))
+        set_(self, "degree", whole_number("degree", self.degree, 1, 2, of="CameraTriangles"))
+        set_(self, "faces", _faces(self.faces, len(self.vertices), self.degree))
         if (self.directions is None) == (self.normals is None):
             raise InputError("CameraTriangles: give directions=, or normals= and eye=, not both or neither")
         name = "normals" if self.directions is None else "directions"
@@ -72,6 +79,8 @@ class CameraTriangles(Camera):
         set_(self, "resolution", _resolution(self.resolution, len(self.faces)))
         if self.ray_scale not in SCALES:
             raise InputError(f"ray_scale={self.ray_scale!r}: allowed are {', '.join(SCALES)}")
+        if self.ray_scale == "plane" and self.degree > 1:
+            raise InputError("CameraTriangles: ray_scale='plane' is for flat triangles: use 'unit' with degree=2")
         if self.ray_scale == "plane" and self.directions is not None:
             self._check_plane()
         register_pytrees()
@@ -159,7 +168,7 @@ class CameraTriangles(Camera):
         """Camera triangles that are general linear, each in a frame on its own plane; None where they are not."""
         if not self.linear:
             return None
-        places, rays = (np.stack([self.corners(i)[k] for i in range(3)]) for k in range(2))
+        places, rays = (np.stack([self.node(i)[k] for i in range(3)]) for k in range(2))
         first = places[0]
         right, normal = normalize(places[1] - first), normalize(cross(places[1] - first, places[2] - first))
         normal = where(dot(normal, rays[0]) < 0, -1.0, 1.0) * normal
@@ -179,8 +188,15 @@ class CameraTriangles(Camera):
         face, _, _, inside = self.atlas.locate(x, y)
         return where(inside, face, -1)
 
-    def corners(self, i: int) -> tuple[Vector, Vector]:
-        """Positions of corner i of all camera triangles, and their rays (direct, scaled) or normals; each (3, F)."""
+    @property
+    def nodes(self) -> int:
+        """Vertices of each camera triangle: 3, or 6 for degree 2."""
+        return NODES[self.degree]
+
+    def node(self, i: int) -> tuple[Vector, Vector]:
+        """Positions of vertex i (0 to 2: the corners) of all camera triangles, and their rays (direct, scaled) or
+        normals; each (3, F).
+        """
         number = self.faces[:, i]
         place = _columns(self.vertices, number)
         if self.directions is None:
@@ -210,12 +226,14 @@ class CameraTriangles(Camera):
 
     def ray_at(self, face: Array, second: Array, third: Array) -> tuple[Vector, Vector, Array]:
         """Origin, direction (not normalized) and validity of the rays at weights of corners 2 and 3 of faces."""
-        first, *others = (tuple(_taken(values, face) for values in self.corners(i)) for i in range(3))
-        origin, along = first
-        for weight, (place, ray) in zip((second, third), others, strict=True):
-            # From the first corner: exact where all three agree.
-            origin, along = origin + weight * (place - first[0]), along + weight * (ray - first[1])
+        origin, along = self.interpolated(face, second, third)
         return (origin, *self.bend(origin, along))
+
+    def interpolated(self, face: Array, second: Array, third: Array) -> tuple[Vector, Vector]:
+        """Positions, and directions or normals, at weights of corners 2 and 3 of faces."""
+        nodes = [tuple(_taken(values, face) for values in self.node(i)) for i in range(self.nodes)]
+        place, along = (mixed([node[k] for node in nodes], second, third) for k in range(2))
+        return place, along
 
     def bend(self, origin: Vector, along: Vector) -> tuple[Vector, Array]:
         """Direction (not normalized) and validity of rays, from interpolated positions and directions or normals."""
@@ -300,14 +318,18 @@ def _first(mask: Any) -> int:
     return int(np.flatnonzero(mask)[0])
 
 
-def _faces(values: Any, vertices: int) -> np.ndarray:
+def _faces(values: Any, vertices: int, degree: int) -> np.ndarray:
+    wide = NODES[degree]
     try:
         given = np.asarray(values)
         faces = given.astype(np.int32)
     except (TypeError, ValueError):
-        raise InputError("CameraTriangles: faces is not an array of whole numbers: give shape (F, 3)") from None
-    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or not np.array_equal(faces, given):
-        raise InputError(f"CameraTriangles: faces has shape {faces.shape}: give (F, 3) vertex numbers, F at least 1")
+        raise InputError(f"CameraTriangles: faces is not an array of whole numbers: give shape (F, {wide})") from None
+    if faces.ndim != 2 or faces.shape[1] != wide or len(faces) == 0 or not np.array_equal(faces, given):
+        hint = next((f", or degree={d}" for d, many in NODES.items() if faces.ndim == 2 and faces.shape[1] == many), "")
+        raise InputError(
+            f"CameraTriangles: faces has shape {faces.shape}: give (F, {wide}) vertex numbers, F at least 1{hint}"
+        )
     if faces.min() < 0 or faces.max() >= vertices:
         raise InputError(f"CameraTriangles: faces name vertices {faces.min()} to {faces.max()} of {vertices}")
     faces.flags.writeable = False

@@ -33,7 +33,7 @@ class PlaneBounds:
 
 def plane_bounds(camera: Any) -> PlaneBounds:
     """The bounds of a CameraTriangles, in float64."""
-    (a, _), (b, _), (c, _) = (tuple(np.asarray(x).T for x in camera.corners(i)) for i in range(3))
+    (a, _), (b, _), (c, _) = (tuple(np.asarray(x).T for x in camera.node(i)) for i in range(3))
     last = np.broadcast_to(np.asarray(camera.resolution), (camera.count,))[:, None] - 1.0
     right, down = (b - a) / last, (c - a) / last
     normal = np.cross(b - a, c - a)
@@ -61,7 +61,7 @@ def generators(camera: Any) -> tuple[np.ndarray, np.ndarray]:
     Direct: the three rays. Reflection: the ten control vectors of the direction, a cubic polynomial of the weights.
     Refraction: incident direction + s normal at each corner, for the least and the greatest s in the triangle.
     """
-    corners = [tuple(np.asarray(x).T for x in camera.corners(i)) for i in range(3)]
+    corners = [tuple(np.asarray(x).T for x in camera.node(i)) for i in range(3)]
     if camera.directions is not None:
         return np.stack([along for _, along in corners], 1), np.ones(camera.count, bool)
     normals = [along for _, along in corners]
@@ -125,7 +125,7 @@ def _lines(camera: Any, right: np.ndarray, down: np.ndarray, normal: np.ndarray,
     """
     parts = []
     for i in range(3):
-        place, along = (np.asarray(x).T for x in camera.corners(i))
+        place, along = (np.asarray(x).T for x in camera.node(i))
         ray = np.asarray(camera.bend(place.T, along.T)[0]).T
         ray = ray / np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-300)
         inside = ray - _dot(ray, normal) * normal

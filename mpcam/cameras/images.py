@@ -7,6 +7,7 @@ import numpy as np
 from mpcam.cameras import bent_rays, three_rays
 from mpcam.cameras.plane_sweep import ROUNDINGS, plane_sweep
 from mpcam.cameras.types import Projection
+from mpcam.errors import InputError
 from mpcam.math import Array, Vector, detach, epsilon, isfinite, library, maximum, norm, take, vector, where
 
 
@@ -77,7 +78,9 @@ def _on_device(camera: Any, point: Vector) -> tuple[Any, Any, Any]:
 
 def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, Array, Array, Array]]:
     """Images of points in camera triangles: u, v, depth, validity of each that there may be."""
-    corners = [camera.corners(i) for i in range(3)]
+    if camera.degree > 1:
+        raise InputError("CameraTriangles: project is for degree 1; those of degree 2 give rays, and are rasterized")
+    corners = [camera.node(i) for i in range(3)]
     places, rays = (tuple(_at(corner[k], face) for corner in corners) for k in range(2))
     if camera.linear:
         found = [_closed_form(places, rays, point)]

@@ -175,9 +175,7 @@ class _Bends:
             origin, along, valid = self.first.ray_at(face, weight2, weight3)
             origin, along = (np.stack([np.broadcast_to(p, len(face)) for p in v], axis=1) for v in (origin, along))
             return origin, along, np.broadcast_to(valid, len(face))
-        weights = np.stack([1.0 - weight2 - weight3, weight2, weight3], axis=1)[..., None]
-        corners = self.first.faces[face]
-        place, toward = ((weights * table[corners]).sum(1) for table in (self.first.vertices, self.first.normals))
+        place, toward = (values.T for values in self.first.interpolated(face, weight2, weight3))
         shot = shoot(self.reflector, place, toward)
         along, valid = bent(shot.points - self.first.eye, shot.normals, self.first.index)
         return shot.points, along, valid

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.triangle_nodes import corners_only
 from mpcam.checks import is_number, shown, whole_number
 from mpcam.decomposition.crossing import crossing
 from mpcam.decomposition.reflector import Reflector, reflector_of
@@ -136,5 +137,5 @@ def vertex_normals(cams: CameraTriangles, reflector: Reflector) -> np.ndarray:
     """(V, 3) normals that tie camera triangles in the world to the surface: their own, or the surface's beside them."""
     if cams.normals is not None:
         return cams.normals
-    around = Mesh(cams.vertices, cams.faces).smooth_normals()
+    around = Mesh(cams.vertices, corners_only(cams.faces)).smooth_normals()
     return reflector.at(*reflector.closest(cams.vertices, around))[1]

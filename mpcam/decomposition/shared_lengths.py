@@ -23,10 +23,12 @@ _PULL = 1e-6
 def slants(cams: CameraTriangles) -> np.ndarray:
     """(3, F): parts of the unit rays at the corners of each camera triangle along its normal.
 
-    Raises InputError for camera triangles with normals: their rays are bent pixel by pixel.
+    Raises InputError for camera triangles with normals, whose rays are bent pixel by pixel, and for curved ones.
     """
     if cams.directions is None:
         raise InputError("give camera triangles with directions: see directions_at_vertices")
+    if cams.degree > 1:
+        raise InputError("camera triangles of degree 2 are no general linear cameras: give them with degree=1")
     a, b, c = (cams.vertices[cams.faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from mpcam.cameras.triangle_nodes import mixed, sides, weights
 from mpcam.decomposition.reflector import Reflector
 
 INSIDE = 1e-9
@@ -88,7 +89,7 @@ class Place:
 class Locator:
     """Finds the camera triangle and the weights of points of the true surface: the inverse of `shoot`.
 
-    vertices (V, 3), normals (V, 3), faces (F, 3): the camera triangles.
+    vertices (V, 3), normals (V, 3), faces (F, 3), or (F, 6) for degree 2: the camera triangles.
     """
 
     def __init__(self, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray):
@@ -96,17 +97,17 @@ class Locator:
         self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         used = self.vertices[self.faces].reshape(-1, 3)
         self.center, self.size = used.mean(axis=0), float(np.ptp(used, axis=0).max()) or 1.0
-        self.neighbors = neighbors(self.faces)
+        self.neighbors = neighbors(self.faces[:, :3])
         side = int(np.clip(np.sqrt(_SAMPLES / len(faces)), 2, 40))
         i, j = (v.ravel() for v in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
         # Centers of the upright and of the reversed cells of a triangular grid.
         upright, reversed_ = i + j < side, i + j < side - 1
         second = np.concatenate([i[upright] + 1 / 3, i[reversed_] + 2 / 3]) / side
         third = np.concatenate([j[upright] + 1 / 3, j[reversed_] + 2 / 3]) / side
-        weights = np.stack([1 - second - third, second, third], axis=1)
-        places = np.einsum("kc,fcx->fkx", weights, self.vertices[self.faces]).reshape(-1, 3)
-        ways = np.einsum("kc,fcx->fkx", weights, self.normals[self.faces]).reshape(-1, 3)
-        self._owner = np.repeat(np.arange(len(faces)), len(weights))
+        parts = np.stack(weights(second, third, self.faces.shape[1]), axis=1)
+        places = np.einsum("kc,fcx->fkx", parts, self.vertices[self.faces]).reshape(-1, 3)
+        ways = np.einsum("kc,fcx->fkx", parts, self.normals[self.faces]).reshape(-1, 3)
+        self._owner = np.repeat(np.arange(len(faces)), len(parts))
         self._tree = KDTree(self._features(places, ways))
 
     def _features(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -123,12 +124,12 @@ class Locator:
         left = np.arange(count)
         for _ in range(_STEPS):
             w2, w3, solved = self._solved(face[left], points[left])
-            weights = np.stack([1.0 - w2 - w3, w2, w3], axis=1)
-            done = solved & (weights.min(axis=1) >= -INSIDE)
+            inner = np.stack([1.0 - w2 - w3, w2, w3], axis=1)
+            done = solved & (inner.min(axis=1) >= -INSIDE)
             second[left], third[left], inside[left] = w2, w3, done
             # Across the edge opposite to the most negative weight that has a neighbor.
             beyond = self.neighbors[face[left]]
-            step = np.where((weights < -INSIDE) & (beyond >= 0), weights, np.inf)
+            step = np.where((inner < -INSIDE) & (beyond >= 0), inner, np.inf)
             edge = step.argmin(axis=1)
             row = np.arange(len(left))
             go = ~done & np.isfinite(step[row, edge])
@@ -139,9 +140,9 @@ class Locator:
         lost = np.flatnonzero(~inside)
         if len(lost):
             self._searched(lost, points, features, face, second, third, inside)
-        weights = np.maximum(np.stack([1.0 - second - third, second, third], axis=1), 0.0)
-        weights = weights / weights.sum(axis=1, keepdims=True)
-        return Place(face.astype(np.int32), weights[:, 1], weights[:, 2], inside)
+        inner = np.maximum(np.stack([1.0 - second - third, second, third], axis=1), 0.0)
+        inner = inner / inner.sum(axis=1, keepdims=True)
+        return Place(face.astype(np.int32), inner[:, 1], inner[:, 2], inside)
 
     def _searched(self, lost, points, features, face, second, third, inside) -> None:
         """For points that no walk found: the candidate nearby that holds them, or else comes nearest to it."""
@@ -152,27 +153,27 @@ class Locator:
         rows, columns = np.nonzero(fresh)
         faces = candidates[rows, columns]
         w2, w3, solved = self._solved(faces, points[lost[rows]])
-        weights = np.maximum(np.stack([1.0 - w2 - w3, w2, w3], axis=1), 0.0)
+        inner = np.maximum(np.stack([1.0 - w2 - w3, w2, w3], axis=1), 0.0)
         within = solved & (np.minimum(np.minimum(w2, w3), 1.0 - w2 - w3) >= -INSIDE)
-        weights = weights / weights.sum(axis=1, keepdims=True)
-        gap = np.linalg.norm(
-            (weights[..., None] * self.vertices[self.faces[faces]]).sum(1) - points[lost[rows]], axis=1
-        )
+        inner = inner / inner.sum(axis=1, keepdims=True)
+        parts = np.stack(weights(inner[:, 1], inner[:, 2], self.faces.shape[1]), axis=1)
+        gap = np.linalg.norm((parts[..., None] * self.vertices[self.faces[faces]]).sum(1) - points[lost[rows]], axis=1)
         order = np.lexsort((gap, ~within, rows))
         first = order[np.concatenate([[True], np.diff(rows[order]) != 0])]
         face[lost], inside[lost] = faces[first], within[first]
-        second[lost], third[lost] = weights[first, 1], weights[first, 2]
+        second[lost], third[lost] = inner[first, 1], inner[first, 2]
 
     def _solved(self, face: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Weights 2 and 3 with p(w) + c N(w) = point, also outside of the triangle, and whether they were found."""
-        a, b, c = (self.vertices[self.faces[face, i]].T for i in range(3))
-        n, n2, n3 = (self.normals[self.faces[face, i]].T for i in range(3))
-        e2, e3, m2, m3 = b - a, c - a, n2 - n, n3 - n
+        places, normals = (
+            [table[column].T for column in self.faces[face].T] for table in (self.vertices, self.normals)
+        )
         second, third, away = np.full(len(face), 1 / 3), np.full(len(face), 1 / 3), np.zeros(len(face))
         with np.errstate(all="ignore"):
             for _ in range(7):
-                along = n + second * m2 + third * m3
-                miss = a + second * e2 + third * e3 + away * along - points.T
+                along = mixed(normals, second, third)
+                miss = mixed(places, second, third) + away * along - points.T
+                (e2, e3), (m2, m3) = (sides(values, second, third) for values in (places, normals))
                 j2, j3 = e2 + away * m2, e3 + away * m3
                 across = _cross(j3, along)
                 volume = (j2 * across).sum(0)

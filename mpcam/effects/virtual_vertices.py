@@ -21,7 +21,7 @@ from mpcam.errors import InputError
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.order import nearby
 from mpcam.math.pose import frame_origin
-from mpcam.rendering.camera_triangle_rays import corner_rays
+from mpcam.rendering.camera_triangle_rays import node_rays
 from mpcam.rendering.device_camera import world_rays
 from mpcam.rendering.vertex import VertexProjected, corner, tessellated
 
@@ -53,7 +53,7 @@ class VirtualVertices(VertexProjected):
         pose = np.asarray(cams.camera_from_world, np.float64)
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = pose[:3, :3].T, frame_origin(pose) - self.device.anchor
-        table = corner_rays(cams, frame, self.device.scale)
+        table = node_rays(cams, frame, self.device.scale)
         self.rays = t.Float(aligned(table.transpose(2, 0, 1))) + opaque_zero()
         self.cones = _cones(table)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -91,8 +91,10 @@ def with_directions(cams: CameraTriangles) -> CameraTriangles:
     """Camera triangles with rays at the vertices, less those that have a vertex where all light is reflected.
 
     Rays are as long as those that come from the eye: then the images in a flat mirror are exact, however large the
-    triangles. Raises InputError where none is left.
+    triangles. Raises InputError where none is left, and for camera triangles of degree 2.
     """
+    if cams.degree > 1:
+        raise InputError("method='vertex' takes camera triangles of degree 1: give those that decompose makes, or none")
     if cams.normals is None:
         return cams
     _, valid = cams.bend(cams.vertices.T, cams.normals.T)

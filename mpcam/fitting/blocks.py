@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from mpcam.fitting.bernstein import slopes
+from mpcam.fitting.basis import slopes
 from mpcam.fitting.rays import Eye, Kind, Sample, residual, ties_of, unit, walk
 
 BARRIER = 1e-2

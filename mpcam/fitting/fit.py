@@ -15,12 +15,14 @@ from mpcam.errors import InputError
 from mpcam.fitting.frames import RIMS, fixed_parts, frames_of
 from mpcam.fitting.levenberg import Outcome, Step, solved
 from mpcam.fitting.result import Fit, as_start
-from mpcam.fitting.samples import split_samples
+from mpcam.fitting.samples import Split, held_by, split_samples
 from mpcam.fitting.state import State, padded, state_of
 from mpcam.geometry.mesh import Mesh
 from mpcam.geometry.surfaces import Surface
 
-_PER_TRIANGLE, _AT_LEAST, _AT_MOST = 32, 6_144, 98_304
+_PER_TRIANGLE = {1: 32, 2: 96}
+"""True rays to fit for each triangle, by degree."""
+_AT_LEAST, _AT_MOST = 6_144, 98_304
 _POOL, _LARGEST_POOL = 5, 160_000
 """Rays looked at for each one that is fitted: small triangles keep all of theirs."""
 _TEST = 8_000
@@ -50,8 +52,8 @@ def fit(
     dictionary with True or masks for "positions" ("along" the surface, "off" it) and "normals" or "rays" ("turn",
     "length"). rim: border vertices move as others do ("free"), along the border ("along") or not ("fixed").
     solver: "blocks", or "optimistix", which is slower and ends a little higher, to check the first. iterations: at
-    most. samples: true rays to fit, default 32 for each triangle, at least 6,144. seed: of where they lie. progress:
-    called with each iteration's Step. Ctrl-C ends the fit with what is best so far.
+    most. samples: true rays to fit, default 32 for each triangle (96 for degree 2), at least 6,144. seed: of where they
+    lie. progress: called with each iteration's Step. Ctrl-C ends the fit with what is best so far.
 
     Least squares of the errors in two planes, half a radius and two radii away, by Levenberg and Marquardt's method,
     normals and lengths first, then all. Float64, whatever JAX is set to. Returns a Fit whose error is that on pixels
@@ -72,11 +74,14 @@ def fit(
     parts = fixed_parts(fixed, len(start.vertices))
     whole, world = reflector_of(reflector), in_world(start)
     check_eye(world, eye_point(eye), whole.radius)
-    wanted = min(max(padded(_PER_TRIANGLE * world.count), _AT_LEAST), _AT_MOST)
+    many = _PER_TRIANGLE[world.degree] * world.count
+    wanted = min(max(padded(many), _AT_LEAST), _AT_MOST)
     wanted = wanted if samples is None else whole_number("samples", samples, 16, 10_000_000)
     pool = max(min(_POOL * wanted, _LARGEST_POOL), wanted)
     split = split_samples(whole, eye, pool, max(_TEST, pool // 8), seed)
-    state = state_of(world, whole, split.fitted, wanted)
+    fitted, places = held_by(world, whole, split.fitted)
+    split = Split(fitted, held_by(world, whole, split.held_out)[0])
+    state = state_of(world, whole, fitted, wanted, places)
     stages = _stages(state, parts, rim, iterations, first=not history)
     unknowns = int(sum((np.abs(frames).sum(axis=1) > 0).sum() for _, frames, _ in stages[-1:]))
     scales = np.asarray(state.eye.scales)

@@ -1,5 +1,6 @@
 """Which of a node's six numbers may move, and along which axes."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -90,14 +91,17 @@ def _across(ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _rim(faces: np.ndarray, places: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(V,) nodes on the border, (V, 3) which way it runs there, and (V,) whether it turns sharply."""
     face, corner = np.nonzero(neighbors(faces[:, :3]) < 0)
-    one, other = faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
+    line = [faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]]
+    if faces.shape[1] == 6:
+        line.insert(1, faces[face, 3 + corner])
     border = np.zeros(count, bool)
     along, lengths = np.zeros((count, 3)), np.zeros(count)
-    edge = places[other] - places[one]
-    length = np.linalg.norm(edge, axis=1)
-    for ends in (one, other):
-        border[ends] = True
-        np.add.at(along, ends, edge / np.maximum(length, 1e-300)[:, None])
-        np.add.at(lengths, ends, 1.0)
+    for one, other in itertools.pairwise(line):
+        edge = places[other] - places[one]
+        length = np.linalg.norm(edge, axis=1)
+        for ends in (one, other):
+            border[ends] = True
+            np.add.at(along, ends, edge / np.maximum(length, 1e-300)[:, None])
+            np.add.at(lengths, ends, 1.0)
     straight = np.linalg.norm(along, axis=1) / np.maximum(lengths, 1.0)
     return border, along, (straight < 1.0 - _CORNER * 0.5) | (lengths != 2)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax.lax import stop_gradient
 
 from mpcam.decomposition.crossing import FAR, NEAR, crossing
-from mpcam.fitting.bernstein import basis, slopes
+from mpcam.fitting.basis import basis, slopes
 from mpcam.math.optics import reflect, refract
 
 INSIDE = 1e-9

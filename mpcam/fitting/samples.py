@@ -5,12 +5,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpcam.cameras.base import Camera
+from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.decomposition.border import Border
+from mpcam.decomposition.ray_error import vertex_normals
 from mpcam.decomposition.reflector import Reflector, pixel_hits
+from mpcam.decomposition.shooting import Locator, Place
 from mpcam.decomposition.views import SeenPoints, eye_point, seen_samples
 from mpcam.errors import InputError
 
 HELD_OUT = 5
 """One pixel in so many is kept for the test."""
+_STRIP = 0.2
+"""Part of a triangle's longest edge that the reflector's border may lie beyond the triangle's."""
 
 
 class Split(NamedTuple):
@@ -37,6 +43,26 @@ def split_samples(reflector: Reflector, eye: Any, count: int, test: int, seed: i
     if not all(len(part.points) for part in parts):
         raise InputError("the eye sees nothing of the reflector: give another point or camera")
     return Split(*parts)
+
+
+def held_by(cams: CameraTriangles, reflector: Reflector, view: SeenPoints) -> tuple[SeenPoints, Place]:
+    """Those of the points that camera triangles in the world are there for, and where they lie in them.
+
+    `decompose` leaves triangles out that hold no pixel's center. What is seen of them between the centers has no ray,
+    and the nearest one is far off: a few such points would outweigh all others. Points beyond a border that is the
+    reflector's own count, at the nearest place.
+    """
+    found = Locator(cams.vertices, vertex_normals(cams, reflector), cams.faces).locate(view.points, view.normals)
+    kept, rows = found.inside.copy(), np.flatnonzero(~found.inside)
+    border = Border(reflector) if len(rows) else None
+    if border is not None and border.count:
+        corners = cams.vertices[cams.faces[found.face[rows], :3]]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        kept[rows] = border.nearest(view.points[rows])[0] <= _STRIP * longest
+    if not kept.any():
+        return view, found
+    points = SeenPoints(view.eye, view.points[kept], view.normals[kept], view.face[kept], view.whole)
+    return points, Place(found.face[kept], found.second[kept], found.third[kept], found.inside[kept])
 
 
 def _pixels_around(hit: np.ndarray) -> np.ndarray:

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.triangle_nodes import sides
 from mpcam.decomposition.crossing import FAR, NEAR, crossing
 from mpcam.decomposition.ray_error import bent, vertex_normals
 from mpcam.decomposition.reflector import Reflector
-from mpcam.decomposition.shooting import Locator, neighbors
+from mpcam.decomposition.shooting import Locator, Place, neighbors
 from mpcam.decomposition.views import SeenPoints
 from mpcam.fitting.blocks import Mesh
 from mpcam.fitting.rays import LEAST, Eye, Kind, Sample
@@ -44,24 +45,29 @@ def padded(count: int) -> int:
     return size
 
 
-def state_of(cams: CameraTriangles, reflector: Reflector, view: SeenPoints, most: int) -> State:
+def state_of(
+    cams: CameraTriangles, reflector: Reflector, view: SeenPoints, most: int, found: Place | None = None
+) -> State:
     """The state at camera triangles in the world, beside points that their eye sees.
 
-    most: samples at most, taken from triangles that have many: the small ones keep theirs, and none is fitted by a few.
-    Weights make up for that. Scales make the cost 1 where camera triangles are now, if they are not exact.
+    found: where the points lie in the camera triangles, if that is known. most: samples at most, taken from triangles
+    that have many: the small ones keep theirs, and none is fitted by a few. Weights make up for that. Scales make the
+    cost 1 where camera triangles are now, if they are not exact.
     """
     scale, center = reflector.radius or 1.0, reflector.center
     values = cams.normals if cams.normals is not None else cams.directions
     if cams.directions is not None and cams.ray_scale == "unit":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
-    kind = Kind(3, cams.kind)
+    kind = Kind(cams.nodes, cams.kind)
     ties = vertex_normals(cams, reflector)
     ties = ties / np.linalg.norm(ties, axis=1, keepdims=True)
     true, passes = bent(view.points - view.eye, view.normals, cams.index)
-    points, normals, true = view.points[passes], view.normals[passes], true[passes]
-    found = Locator(cams.vertices, ties, cams.faces).locate(points, normals)
-    rows, weights = thinned(found.face, len(cams.faces), most)
-    face, points, true = found.face[rows], points[rows], true[rows]
+    if found is None:
+        found = Locator(cams.vertices, ties, cams.faces).locate(view.points, view.normals)
+    going = np.flatnonzero(passes)
+    chosen, weights = thinned(found.face[going], len(cams.faces), most)
+    rows = going[chosen]
+    face, points, true = found.face[rows], view.points[rows], true[rows]
     place = np.stack([found.second[rows], found.third[rows], np.zeros(len(rows))], axis=1)
     vertices, points = (cams.vertices - center) / scale, (points - center) / scale
     origin, along, _ = cams.ray_at(face, place[:, 0], place[:, 1])
@@ -72,10 +78,7 @@ def state_of(cams: CameraTriangles, reflector: Reflector, view: SeenPoints, most
     right = np.cross(true, helper)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
     across = np.stack([right, np.cross(true, right)], axis=1)
-    corners = vertices[cams.faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(flat, axis=1, keepdims=True)
-    cosine = np.einsum("fx,fcx->fc", flat / np.where(length > 0, length, 1.0), ties[cams.faces])
+    cosine = _cosines(vertices, ties, cams.faces)
     side = np.where(cosine.sum(axis=1) < 0, -1.0, 1.0)
     cosine = cosine * side[:, None]
     least = np.where(cosine > 1e-3, np.minimum(_LEAST_COSINE, 0.5 * cosine), 0.0)
@@ -84,7 +87,7 @@ def state_of(cams: CameraTriangles, reflector: Reflector, view: SeenPoints, most
     v, f, n = (padded(max(count, least)) for count, least in zip(real, SMALLEST, strict=True))
     mesh = Mesh(
         _filled(cams.faces.astype(np.int32), f),
-        _filled(neighbors(cams.faces).astype(np.int32), f, -1),
+        _filled(neighbors(cams.faces[:, :3]).astype(np.int32), f, -1),
         _filled(ties, v, 1.0),
         np.arange(f) < real[1],
         _filled(least, f),
@@ -95,6 +98,17 @@ def state_of(cams: CameraTriangles, reflector: Reflector, view: SeenPoints, most
     index = 1.0 if cams.index is None else float(cams.index)
     seen = Eye(eye, np.float64(index), np.maximum(np.array(scales), 1e-12) / np.sqrt(_SHARES))
     return State(_filled(nodes, v, 1.0), _filled(face, n), _filled(place, n, 1 / 3), mesh, samples, seen, kind, real)
+
+
+def _cosines(vertices: np.ndarray, ties: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F, 3) between what faces look to at their corners, and the ties there."""
+    nodes, found = [vertices[column].T for column in faces.T], []
+    for corner, place in enumerate(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))):
+        right, down = sides(nodes, *(np.full(len(faces), weight) for weight in place))
+        across = np.cross(right.T, down.T)
+        length = np.linalg.norm(across, axis=1)
+        found.append((across * ties[faces[:, corner]]).sum(axis=1) / np.where(length > 0, length, 1.0))
+    return np.stack(found, axis=1)
 
 
 def thinned(face: np.ndarray, faces: int, most: int) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ def write_fit(path: str | Path, result: Fit) -> None:
     about = {
         "schema": _SCHEMA,
         "ray_scale": camera.ray_scale,
+        "degree": camera.degree,
         "status": result.status,
         "history": [list(step) for step in result.history],
         "errors": {name: dataclasses.asdict(getattr(result, name)) for name in ERRORS},
@@ -53,7 +54,7 @@ def read_fit(path: str | Path) -> Fit:
         for name in ("index", "resolution"):
             if name in tables and tables[name].ndim == 0:
                 tables[name] = tables[name].item()
-        camera = CameraTriangles(**tables, ray_scale=about["ray_scale"])
+        camera = CameraTriangles(**tables, ray_scale=about["ray_scale"], degree=about.get("degree", 1))
         errors = {name: RayError(**about["errors"][name]) for name in ERRORS}
         history = tuple(Step(*step) for step in about["history"])
     except (KeyError, TypeError) as error:

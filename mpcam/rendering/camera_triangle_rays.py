@@ -8,6 +8,7 @@ import numpy as np
 
 from mpcam.backend import aligned, opaque_numbers, types
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.triangle_nodes import mixed
 from mpcam.cameras.types import Ray
 from mpcam.math import normalize
 from mpcam.rendering.block_layout import BlockLayout, atlas_layout
@@ -27,7 +28,7 @@ def camera_triangle_rays(camera: CameraTriangles, device: DeviceMesh, planes: bo
     anchor = pose[:3, :3] @ device.anchor + pose[:3, 3]
     frame = np.eye(4)
     frame[:3, 3] = -anchor
-    table = corner_rays(camera, frame, scale)
+    table = node_rays(camera, frame, scale)
     rows = t.Float(aligned(table.transpose(2, 0, 1)))
     bent: dict[str, Any] = {}
     if camera.directions is None:
@@ -35,7 +36,9 @@ def camera_triangle_rays(camera: CameraTriangles, device: DeviceMesh, planes: bo
         if camera.index is not None:
             bent["index"] = opaque_numbers([float(camera.index)])[0]
     used = {name: fixed[name] for name in ("face", "x", "y")} | {"side": _sides(camera.atlas)}
-    rays = _frozen_rays(camera.kind)(fixed["threads"][0], used, rows, bent, rows_for("general", "Rays", layout, 0))
+    rays = _frozen_rays(camera.kind, camera.nodes)(
+        fixed["threads"][0], used, rows, bent, rows_for("general", "Rays", layout, 0)
+    )
     blocks = bounded("general", rays, layout)
     if planes:
         blocks = replace(blocks, planes=_planes(camera, anchor, scale, layout, blocks.cones))
@@ -43,13 +46,13 @@ def camera_triangle_rays(camera: CameraTriangles, device: DeviceMesh, planes: bo
     return DeviceRays(layout, "general", anchor, blocks, rows)
 
 
-def corner_rays(camera: CameraTriangles, frame: np.ndarray, scale: float) -> np.ndarray:
-    """Positions and rays (or normals) of corner 1, then 2, then 3 of all camera triangles, (6, 3, F).
+def node_rays(camera: CameraTriangles, frame: np.ndarray, scale: float) -> np.ndarray:
+    """Positions and rays (or normals) of one vertex after the other of all camera triangles: (6, 3, F), or (12, 3, F).
 
     frame: 4x4, rigid, from the camera's frame to the one wanted. scale: the unit there, scene units.
     """
     rows = []
-    for place, along in (camera.corners(i) for i in range(3)):
+    for place, along in (camera.node(i) for i in range(camera.nodes)):
         rows += [(frame[:3, :3] @ np.asarray(place) + frame[:3, 3:]) / scale, frame[:3, :3] @ np.asarray(along)]
     return np.stack(rows)
 
@@ -118,8 +121,8 @@ def _planes(camera: CameraTriangles, anchor: np.ndarray, scale: float, layout: B
 
 
 @functools.lru_cache(maxsize=16)
-def _frozen_rays(kind: str) -> Any:
-    """Kernel of one kind of camera triangle: rays by slot."""
+def _frozen_rays(kind: str, nodes: int) -> Any:
+    """Kernel of one kind of camera triangle, with so many vertices: rays by slot."""
     import drjit as dr
 
     from mpcam_kernels.frozen import frozen
@@ -137,11 +140,8 @@ def _frozen_rays(kind: str) -> Any:
         x, y = dr.gather(t.UInt, fixed["x"], block) + column, dr.gather(t.UInt, fixed["y"], block) + row
         last = t.Float(side) - 1
         second, third = t.Float(x) / last, t.Float(y) / last
-        table = [dr.gather(t.Array3f, rows, face * 6 + k) for k in range(6)]
-        origin, along = table[0], table[1]
-        for weight, at in ((second, 2), (third, 4)):
-            origin = origin + weight * (table[at] - table[0])
-            along = along + weight * (table[at + 1] - table[1])
+        table = [dr.gather(t.Array3f, rows, face * (2 * nodes) + k) for k in range(2 * nodes)]
+        origin, along = (mixed(table[k::2], second, third) for k in range(2))
         camera = _bender(kind, bent)
         direction, valid = camera.bend(origin, along)
         direction = normalize(direction)

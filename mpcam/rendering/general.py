@@ -66,6 +66,8 @@ class GeneralRasterizer(Moving):
             raise InputError(
                 f"bound={self.bound!r} is for camera triangles, not for a {type(camera).__name__}: use bound='tight'"
             )
+        if self.bound != "tight" and isinstance(camera, CameraTriangles) and camera.degree > 1:
+            raise InputError(f"bound={self.bound!r} is for camera triangles of degree 1: use bound='tight'")
         if not isinstance(camera, CameraTriangles):
             self._look_from(looks_from(camera))
         self.camera, self.rays = camera, device_rays(camera, self.device, self.bound != "tight")
