@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from mpcam.backend import exclusive, opaque_zero, types
+from mpcam.backend import aligned, exclusive, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.ray_map import RayMap
 from mpcam.cameras.types import Ray
@@ -163,7 +163,9 @@ class Weighted:
 
     def __init__(self, part: MirrorPart, weights: Sequence[np.ndarray]):
         self.part, self.stages = part, part.stages
-        self._weights = [types().Array3f(np.ascontiguousarray(w.T, np.float32)) + opaque_zero() for w in weights]
+        self._weights = [
+            types().Array3f(*(types().Float(aligned(part)) for part in w.T)) + opaque_zero() for w in weights
+        ]
 
     def move(self, mesh: Mesh) -> None:
         self.part.move(mesh)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpcam.backend import opaque_numbers, opaque_zero, types
+from mpcam.backend import aligned, opaque_numbers, opaque_zero, types
 from mpcam.cameras.base import Camera
 from mpcam.cameras.types import PosedRays, Ray
 from mpcam.depth_images.depth_image import DepthImage, check_camera
@@ -99,7 +99,7 @@ def by_thickness(start: Entered, camera: Camera, solid: Solid, index: float) -> 
     shift = pose[:3, :3] @ start.anchor + pose[:3, 3]
     numbers = opaque_numbers([*pose[:3, :3].ravel(), *shift, index])
     static = tuple(getattr(camera, name) for name in camera.static_fields)
-    table = types().Float(np.ascontiguousarray(solid.thickness, np.float32)) + opaque_zero()
+    table = types().Float(aligned(solid.thickness)) + opaque_zero()
     faces = attributes(solid.mesh).faces, start.hits.device_triangle, start.hits.device_weights
     seen = start.depth, start.origin, start.view, start.normal, start.along, start.goes
     kernel = _frozen_thickness(type(camera), static, (camera.width, camera.height))
