@@ -142,6 +142,68 @@ def test_rasterized_as_by_brute_force_and_by_tracing(kind, turned):
     assert (np.asarray(mp.rasterize(flat, mesh).triangle) != triangle).mean() > 0.03
 
 
+@pytest.mark.parametrize("kind", ["direct", "mirror"])
+@pytest.mark.parametrize("bent", [0.1, 0.6])
+def test_points_on_rays_project_back_and_nothing_is_invented(kind, bent):
+    """However the triangles are bent: folded over, and with rays to all sides."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        values = [0, 0, 1] + bent * rng.normal(size=(6, 3))
+        given = {"directions": values, "ray_scale": "near_far"} if kind == "direct" else {"normals": values}
+        vertices = np.pad(NODES, ((0, 0), (0, 1))) + bent * rng.normal(size=(6, 3))
+        eye = {"eye": (0.2, 0.3, 4)} if kind == "mirror" else {}
+        camera = mp.CameraTriangles(vertices, [range(6)], **given, **eye, degree=2, resolution=30)
+        pixel = rng.uniform(0, 30, (300, 2))
+        ray = camera.ray(pixel)
+        points = ray.origin + rng.uniform(0.1, 4, 300)[:, None] * ray.direction
+        found = camera.project(points)
+        _, second, third, _ = camera.atlas.locate(*pixel.T)
+        inside = ray.valid & (np.minimum(np.minimum(second, third), 1 - second - third) > 1e-6)
+        off = np.where(found.valid, np.abs(found.pixel - pixel[:, None]).max(-1), np.inf).min(axis=1)
+        assert inside.sum() > 100 and not (inside & ~(off < 1e-3)).any()
+        back = camera.ray(found.pixel)
+        away = points[:, None] - back.origin
+        gap = np.linalg.norm(away - found.depth[..., None] * back.direction, axis=-1)
+        assert gap[found.valid].max() < 1e-9 and back.valid[found.valid].all()
+        assert (np.diff(np.where(found.valid, found.depth, 1e9), axis=1) >= 0).all()
+
+
+def test_both_images_at_a_fold_are_found():
+    """Rays of (x, y, 0) along (s (x - 1/2)^2 - (x - 1/2), (1/4 - y) / 2, 1): two images of points at z = 1, or none."""
+    x, y = NODES.T
+    along = np.stack([0.7 * (x - 0.5) ** 2 - (x - 0.5), 0.5 * (0.25 - y), 1 + 0 * x], axis=1)
+    vertices = np.stack([x, y, 0 * x], axis=1)
+    settings: dict[str, Any] = {"directions": along, "ray_scale": "near_far", "degree": 2, "resolution": 101}
+    camera = mp.CameraTriangles(vertices, [range(6)], **settings)
+    aside, height = np.meshgrid(np.geomspace(1e-4, 0.3, 9), np.linspace(0.02, 0.18, 5))
+    points = np.stack([0.5 + 0.7 * aside**2, 0.5 * height + 0.125, 1 + 0 * aside], axis=-1)
+    found = camera.project(points)
+    assert (found.valid.sum(axis=-1) == 2).all()
+    at = np.sort(np.where(found.valid, found.pixel[..., 0], np.inf), axis=-1)[..., :2]
+    truth = 0.5 + 100 * np.stack([0.5 - aside, 0.5 + aside], axis=-1)
+    assert np.abs(at - truth).max() < 1e-8
+    assert np.abs(np.where(found.valid, found.pixel[..., 1] - 0.5 - 100 * height[..., None], 0)).max() < 1e-8
+    assert not camera.project(points - [0.01, 0, 0]).valid[aside < 0.1].any()
+    assert not camera.project(points * [1, 1, -1]).valid.any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_images_are_the_same_on_the_device(kind):
+    camera = curved(kind)
+    rng = np.random.default_rng(3)
+    ray = camera.ray(rng.uniform(2, 12, (40, 2)))
+    points = ray.origin + rng.uniform(0.5, 2, 40)[:, None] * ray.direction
+    truth = camera.project(points)
+    assert truth.valid.any(axis=1).all()
+    other = camera.project(types().Array3f(*points.T.astype(np.float32)))
+    depth, valid = (
+        np.stack([np.broadcast_to(np.asarray(values), 40) for values in part], -1)
+        for part in (other.depth, other.valid)
+    )
+    nearest = np.where(truth.valid, truth.depth, 1e9).min(axis=1)
+    assert np.allclose(np.where(valid, depth, 1e9).min(axis=1), nearest, rtol=1e-3)
+
+
 SURFACES = {
     "sphere": mp.Surface.sphere(1.0),
     "bowl": mp.Surface.paraboloid(),

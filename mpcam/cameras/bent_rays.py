@@ -1,7 +1,8 @@
-"""Images of points where a camera triangle bends the rays of an eye: interpolated normals, reflection or refraction.
+"""Images of points where rays are no linear function of the place: in curved camera triangles, and in all that bend the
+rays of an eye about interpolated normals.
 
-The pixel's ray is no linear function there (a cubic direction for mirrors), so the triangle is cut into parts whose
-rays are nearly linear. Each part's cubic gives starts, and Newton's method the images of the true rays.
+The triangle is cut into parts whose rays are nearly linear. Each part's cubic gives starts, and Newton's method the
+images of the true rays.
 """
 
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mpcam.cameras import three_rays
+from mpcam.cameras.triangle_nodes import mixed
 from mpcam.math import Array, Vector, cross, detach, dot, epsilon, library, norm, normalize, plain, vector, where
 
 PARTS = 4  # along each side of a camera triangle
@@ -25,9 +27,10 @@ Image = tuple[Array, Array, Array, Array]
 
 
 def project(bend: Bend, v: tuple[Vector, ...], n: tuple[Vector, ...], q: Vector) -> list[Image]:
-    """Images of points q in camera triangles with corners v and normals n: weights 2 and 3, distance, validity.
+    """Images of points q in camera triangles with nodes v and normals n there: weights 2 and 3, distance, validity.
 
-    All components first, broadcast against each other. bend: origin and normal to direction and validity. At most
+    v, n: three vectors, or six (see `triangle_nodes`). All components first, broadcast against each other. bend: origin
+    and normal, or what else is at the nodes, to direction and validity. At most
     IMAGES of them are found, in no order; two that nearly coincide (at a fold) may count as one.
     """
     kind = library(*q, *v[0])
@@ -87,15 +90,12 @@ def _may_pass(rays: list[tuple[Vector, Vector, Array]], q: Vector) -> Array:
 
 
 def _rays(bend: Bend, places: Any, v: Any, n: Any, blank: Array) -> list[tuple[Vector, Vector, Array]]:
-    return [_ray(bend, v, n, blank + second, blank + third) for second, third in places]
+    return [pixel_ray(bend, v, n, blank + second, blank + third) for second, third in places]
 
 
-def _ray(bend: Bend, v: Any, n: Any, second: Array, third: Array) -> tuple[Vector, Vector, Array]:
+def pixel_ray(bend: Bend, v: Any, n: Any, second: Array, third: Array) -> tuple[Vector, Vector, Array]:
     """Origin, unit direction and validity at weights of corners 2 and 3."""
-    origin, normal = (
-        vector(*(c[0][k] + second * (c[1][k] - c[0][k]) + third * (c[2][k] - c[0][k]) for k in range(3)))
-        for c in (v, n)
-    )
+    origin, normal = (vector(*(mixed([node[k] for node in c], second, third) for k in range(3))) for c in (v, n))
     direction, valid = bend(origin, normal)
     return origin, normalize(direction), valid
 
@@ -110,27 +110,29 @@ def _in_part(bend: Bend, corners: Any, v: Any, n: Any, q: Vector) -> list[Image]
     for start in starts:
         weights = (start.w1, start.w2, 1.0 - start.w1 - start.w2)
         second, third = (detach(sum(w * plain(p[i]) for w, p in zip(weights, places, strict=True))) for i in range(2))
-        *image, good = _refined(bend, v, n, q, second, third, detach(start.c))
+        *image, good = refined(bend, v, n, q, second, third, detach(start.c))
         found.append((*image, good & start.valid))
     return found
 
 
-def _refined(bend: Bend, v: Any, n: Any, q: Vector, second: Array, third: Array, distance: Array) -> Image:
+def refined(
+    bend: Bend, v: Any, n: Any, q: Vector, second: Array, third: Array, distance: Array, steps: int = _STEPS
+) -> Image:
     """Newton's method on origin + distance direction = q; weights, distance, and whether they are an image.
 
     The derivative is that of the last step, which is the implicit-function theorem's.
     """
     small = epsilon(second)
     scale, valid, miss = second, second > 0, q
-    for step in range(_STEPS):
-        last = step == _STEPS - 1
+    for step in range(steps):
+        last = step == steps - 1
         if last:
             second, third, distance = detach(second), detach(third), detach(distance)
-        origin, direction, valid = _ray(bend, v, n, second, third)
+        origin, direction, valid = pixel_ray(bend, v, n, second, third)
         miss = vector(*(origin[k] + distance * direction[k] - q[k] for k in range(3)))
         h = 0.3 * small**0.5
         columns = []
-        for aside in (_ray(bend, v, n, second + h, third), _ray(bend, v, n, second, third + h)):
+        for aside in (pixel_ray(bend, v, n, second + h, third), pixel_ray(bend, v, n, second, third + h)):
             moved = [aside[0][k] - origin[k] + distance * (aside[1][k] - direction[k]) for k in range(3)]
             columns.append(vector(*(detach(part / h) for part in moved)))
         a, b, c = *columns, detach(direction)
@@ -138,12 +140,12 @@ def _refined(bend: Bend, v: Any, n: Any, q: Vector, second: Array, third: Array,
         volume = dot(a, across)
         usable = abs(volume) > 0.1 * small * norm(a) * norm(b)
         inverse = where(usable, 1.0 / where(usable, volume, 1.0), 0.0)
-        steps = dot(miss, across) * inverse, dot(miss, cross(c, a)) * inverse, dot(miss, cross(a, b)) * inverse
+        shift = dot(miss, across) * inverse, dot(miss, cross(c, a)) * inverse, dot(miss, cross(a, b)) * inverse
         if not last:  # not out of sight in one step: the linear part's start is near
-            size = abs(steps[0]) + abs(steps[1])
+            size = abs(shift[0]) + abs(shift[1])
             damp = where(size > 0.3, 0.3 / (size + 1e-30), 1.0)
-            steps = tuple(damp * part for part in steps)
-        second, third, distance = second - steps[0], third - steps[1], distance - steps[2]
+            shift = tuple(damp * part for part in shift)
+        second, third, distance = second - shift[0], third - shift[1], distance - shift[2]
         scale = abs(distance) + norm(vector(*(origin[k] - q[k] for k in range(3))))
     edge = -30.0 * small**0.75
     inside = (second >= edge) & (third >= edge) & (1.0 - second - third >= edge)

@@ -87,7 +87,7 @@ class CameraTriangles(Camera):
 
     @classmethod
     def examples(cls, width: int, height: int, camera_from_world: Any = None) -> dict[str, Camera]:
-        """Two triangles with rays of their own, a mirror, a lens, and rays to both sides; about as large as asked."""
+        """Two triangles with rays of their own, a mirror, a lens, a curved mirror, and rays to both sides."""
         pose, side = camera_from_world, min(width, height)
         corners = np.array([[-1, -1, 2], [1, -1, 2.1], [-1, 1, 1.9], [1.1, 1, 2.2]])
         faces = [[0, 1, 2], [1, 3, 2]]
@@ -105,6 +105,15 @@ class CameraTriangles(Camera):
             ),
             "mirror": cls(cap, grid, **bent, camera_from_world=pose),
             "lens": cls(cap, grid, **bent, index=1.5, camera_from_world=pose),
+            "curved": cls(
+                cap,
+                [[0, 2, 6, 4, 3, 1], [8, 6, 2, 4, 5, 7]],
+                normals=cap - [0, 0, 3],
+                eye=(0.2, 0.1, -2),
+                resolution=max(2, side - 3),
+                camera_from_world=pose,
+                degree=2,
+            ),
             "mixed signs": cls(
                 rng.normal(size=(5, 3)),
                 [[0, 1, 2], [1, 2, 3], [2, 3, 4]],
@@ -150,8 +159,12 @@ class CameraTriangles(Camera):
     @property
     def images_per_triangle(self) -> int:
         """Most images that a point has in one camera triangle: 3 (a cubic), 1 where the camera is general linear; 4 are
-        looked for where rays are bent."""
-        return 1 if self.linear else 3 if self.directions is not None else 4
+        looked for where rays are bent, and 8 with degree 2."""
+        if self.linear:
+            return 1
+        if self.degree > 1:
+            return 8
+        return 3 if self.directions is not None else 4
 
     @property
     def linear(self) -> bool:

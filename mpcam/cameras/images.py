@@ -1,14 +1,15 @@
 """Where points appear in camera triangles: every point in every triangle at once."""
 
+import functools
 from typing import Any
 
 import numpy as np
 
-from mpcam.cameras import bent_rays, three_rays
+from mpcam.cameras import bent_rays, curved_images, three_rays
 from mpcam.cameras.plane_sweep import ROUNDINGS, plane_sweep
 from mpcam.cameras.types import Projection
-from mpcam.errors import InputError
 from mpcam.math import Array, Vector, detach, epsilon, isfinite, library, maximum, norm, take, vector, where
+from mpcam.math.optics import reflect, refract
 
 
 def images_of(camera: Any, points: Array) -> Projection:
@@ -78,13 +79,11 @@ def _on_device(camera: Any, point: Vector) -> tuple[Any, Any, Any]:
 
 def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, Array, Array, Array]]:
     """Images of points in camera triangles: u, v, depth, validity of each that there may be."""
-    if camera.degree > 1:
-        raise InputError("CameraTriangles: project is for degree 1; those of degree 2 give rays, and are rasterized")
-    corners = [camera.node(i) for i in range(3)]
-    places, rays = (tuple(_at(corner[k], face) for corner in corners) for k in range(2))
+    nodes = [camera.node(i) for i in range(camera.nodes)]
+    places, rays = (tuple(_at(node[k], face) for node in nodes) for k in range(2))
     if camera.linear:
         found = [_closed_form(places, rays, point)]
-    elif camera.directions is not None:
+    elif camera.directions is not None and camera.degree == 1:
         images = three_rays.project(places, rays, point)
         lengths = []
         for image in images:
@@ -94,6 +93,8 @@ def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, 
                 norm(vector(*(sum(w * ray[k] for w, ray in zip(weights, rays, strict=True)) for k in range(3))))
             )
         found = [(i.w2, 1.0 - i.w1 - i.w2, i.c * length, i.valid) for i, length in zip(images, lengths, strict=True)]
+    elif camera.degree > 1:
+        found = _curved(camera, places, rays, point)
     else:
         found = bent_rays.project(camera.bend, places, rays, point)
     result = []
@@ -101,6 +102,73 @@ def _in_triangles(camera: Any, face: Array, point: Vector) -> list[tuple[Array, 
         u, v = camera.atlas.pixel(face, second, third)
         result.append((where(valid, u, 0.0), where(valid, v, 0.0), where(valid, depth, 0.0), valid))
     return result
+
+
+def _curved(camera: Any, places: Any, rays: Any, point: Vector) -> list[tuple[Array, Array, Array, Array]]:
+    """In camera triangles of degree 2: searched for on the host in float64, so points must be known; one more step of
+    Newton's method in the library of the points gives derivatives.
+    """
+    kind = library(*point, *places[0])
+    numbers = [*(part for one in (*places, *rays, point) for part in one), *(() if camera.eye is None else camera.eye)]
+    if camera.index is not None:
+        numbers.append(camera.index)
+    if kind == "numpy":
+        return _searched(*numbers, bends=camera.kind)
+    search = functools.partial(_searched, bends=camera.kind)
+    if kind == "jax":
+        import jax
+        import jax.numpy as jnp
+
+        numbers = [jax.lax.stop_gradient(jnp.asarray(part)) for part in numbers]
+        shape = jnp.broadcast_shapes(*(part.shape for part in numbers))
+        dtype = point[0].dtype
+
+        def host(*given: Any) -> Any:
+            found = search(*(np.asarray(part, np.float64) for part in given))
+            return [(*(np.asarray(x, dtype) for x in image[:3]), image[3]) for image in found]
+
+        value, there = jax.ShapeDtypeStruct(shape, dtype), jax.ShapeDtypeStruct(shape, np.dtype(bool))
+        wanted = [(value, value, value, there)] * curved_images.IMAGES
+        starts = jax.pure_callback(host, wanted, *numbers, vmap_method="sequential")
+    else:
+        import drjit as dr
+
+        number = type(point.x)
+        found = search(*(np.asarray(dr.detach(number(part)).numpy(), np.float64) for part in numbers))
+        starts = [(*(number(x) for x in image[:3]), dr.mask_t(number)(image[3])) for image in found]
+    result = []
+    for second, third, depth, valid in starts:
+        image = bent_rays.refined(camera.bend, places, rays, point, second, third, depth, steps=1)
+        result.append((*image[:3], valid))
+    return result
+
+
+def _searched(*numbers: Any, bends: str) -> list[tuple[Any, Any, Any, Any]]:
+    """The images for NumPy numbers: of places, rays and points, and of the eye and the index if there are any."""
+    given = [np.asarray(part, np.float64) for part in numbers]
+    places, rays, point = given[:18], given[18:36], np.stack(np.broadcast_arrays(*given[36:39]))
+    shape = np.broadcast_shapes(*(part.shape for part in given))
+    wide = [
+        tuple(np.stack([np.broadcast_to(x, shape) for x in part[k : k + 3]]) for k in range(0, 18, 3))
+        for part in (places, rays)
+    ]
+    eye = None if bends == "direct" else np.array([float(part.ravel()[0]) for part in given[39:42]])
+
+    def bend(origin: Any, along: Any) -> Any:
+        if bends == "direct":
+            return along, (along * along).sum(axis=0) > 0
+        come = origin - eye.reshape(3, *(1,) * (origin.ndim - 1))
+        if bends == "reflection":
+            way = reflect(come, along)
+            return way, (way * way).sum(axis=0) > 0
+        return refract(come, along, float(given[42].ravel()[0]))
+
+    with np.errstate(all="ignore"):
+        if bends != "refraction":
+            return curved_images.project(bend, *wide, point, eye)
+        found = bent_rays.project(bend, *wide, point)
+    nothing = (*(np.zeros(shape) for _ in range(3)), np.zeros(shape, bool))
+    return [*found, *[nothing] * (curved_images.IMAGES - len(found))]
 
 
 def _closed_form(

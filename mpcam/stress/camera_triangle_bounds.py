@@ -10,6 +10,7 @@ import numpy as np
 
 from mpcam.backend import types
 from mpcam.cameras.camera_triangles import CameraTriangles
+from mpcam.cameras.triangle_nodes import EDGES
 from mpcam.geometry.mesh import Mesh
 from mpcam.rendering.general import GeneralRasterizer
 from mpcam.rendering.registry import RAY_BOUNDS as BOUNDS
@@ -17,16 +18,19 @@ from mpcam.stress.report import StressRow
 
 SIDE, FACES, TRIANGLES = 20, 10, 2000
 """Pixels along the short sides of a camera triangle, camera triangles of a camera, and scene triangles before it."""
-KINDS = ("positive", "mixed signs", "grazing", "parallel", "concurrent", "mirror", "lens", "tiny triangles", "needles")
+KINDS = (
+    *("positive", "mixed signs", "grazing", "parallel", "concurrent", "mirror", "lens", "tiny triangles", "needles"),
+    *("curved", "curved mirror", "curved lens"),
+)
 
 
 def bound_rows(kind: str, pairs: int) -> list[StressRow]:
-    """One row per bound; pairs: of a camera triangle and a scene triangle, about."""
-    missed, tried = dict.fromkeys(BOUNDS, 0), 0
+    """One row per bound; pairs: of a camera triangle and a scene triangle, about. Curved ones have one bound."""
+    missed, tried = dict.fromkeys(("tight",) if kind.startswith("curved") else BOUNDS, 0), 0
     for camera, mesh in scenes(kind, max(1, pairs // (FACES * TRIANGLES))):
         true = pairs_that_hit(camera, mesh)
         tried += camera.count * mesh.triangle_count
-        for bound in BOUNDS:
+        for bound in missed:
             missed[bound] += abs(true - GeneralRasterizer(camera, mesh, bound).frame().stats.rendered)
     return [
         StressRow("random", f"bounds, {bound}, {kind}", "float32", tried, float("nan"), count, 0)
@@ -44,7 +48,9 @@ def scenes(kind: str, rounds: int, seed: int = 0) -> Iterator[tuple[CameraTriang
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
         vertices = corners.reshape(-1, 3)
-        if kind in ("mirror", "lens"):
+        if kind.startswith("curved"):
+            camera = _curved(kind, rng, corners, normal)
+        elif kind in ("mirror", "lens"):
             bulge = normal + rng.uniform(0, 0.8, (FACES, 1, 1)) * rng.normal(size=(FACES, 3, 3))
             index = None if kind == "mirror" else rng.uniform(0.6, 1.7)
             camera = CameraTriangles(
@@ -55,6 +61,21 @@ def scenes(kind: str, rounds: int, seed: int = 0) -> Iterator[tuple[CameraTriang
                 vertices, faces, directions=_directions(kind, rng, corners, normal), resolution=SIDE
             )
         yield camera, _triangles(kind, rng, camera)
+
+
+def _curved(kind: str, rng: np.random.Generator, corners: np.ndarray, normal: np.ndarray) -> CameraTriangles:
+    """Camera triangles of degree 2, from nearly flat to folded over."""
+    bent = 10 ** rng.uniform(-2, 0, (FACES, 1, 1))
+    edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=-1).mean(axis=1)[:, None, None]
+    middle = corners[:, EDGES].mean(axis=2) + 0.3 * bent * edges * rng.normal(size=(FACES, 3, 3))
+    vertices = np.concatenate([corners, middle], axis=1).reshape(-1, 3)
+    values = (normal + bent * rng.normal(size=(FACES, 6, 3))).reshape(-1, 3)
+    given: dict[str, Any] = {"directions": values}
+    if kind != "curved":
+        given = {"normals": values, "eye": 4 * rng.normal(size=3)}
+        given["index"] = rng.uniform(0.6, 1.7) if kind == "curved lens" else None
+    faces = np.arange(6 * FACES).reshape(FACES, 6)
+    return CameraTriangles(vertices, faces, **given, degree=2, resolution=SIDE)
 
 
 def _directions(kind: str, rng: np.random.Generator, corners: np.ndarray, normal: np.ndarray) -> np.ndarray:
