@@ -77,8 +77,9 @@ class Reflection(SurfacePicture):
             return decompose(mirror.surface, camera, many, resolution=side, index=mirror.index, mode=mode)
 
         cams = given.get("cams")
-        if cams is None and not {"triangles", "resolution"} & given.keys():
-            cams = mirror.camera_triangles
+        ready = mirror.camera_triangles
+        if cams is None and ready is not None and not {"triangles", "resolution"} & given.keys():
+            cams = ready if self.method != "vertex" or ready.degree == 1 else None
         if self.method == "camera_triangles":
             found = decomposed(given.get("resolution", mirror.resolution), mirror.mode) if cams is None else cams
             return ByTriangles(camera, mesh, mirror.surface, found, self.shaded)

@@ -40,9 +40,11 @@ FrameTime = Callable[[list[CameraTriangles]], list[float]]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A decomposition that was looked at. kind: "decomposed" or "fitted". angle: root mean square of the angles of its
-    rays to the true ones, radians, on pixels that were not fitted. seconds: to make it. frame: seconds that a frame
-    takes, None where nobody measured. fit: what was fitted, or None.
+    """A decomposition that was looked at.
+
+    kind: "decomposed", "fitted" or "curved" (fitted, of degree 2). angle: root mean square of the angles of its rays to
+    the true ones, radians, on pixels that were not fitted. seconds: to make it. frame: seconds that a frame takes, None
+    where nobody measured. fit: what was fitted, or None.
     """
 
     kind: str
@@ -117,7 +119,7 @@ def choose_decomposition(
     search = _Search(reflector, eye, index, resolution, settings, progress or (lambda text: None))
     if triangles is not None:
         many = whole_number("triangles", triangles, 1, MOST)
-        found = [search.decomposed(many), search.fitted(many)]
+        found = [search.decomposed(many), search.fitted(many), search.curved(many)]
     elif max_angle is not None:
         found = search.within(max_angle)
     else:
@@ -161,39 +163,46 @@ class _Search:
 
     def decomposed(self, many: int) -> Candidate:
         def make() -> tuple[CameraTriangles, None, float]:
-            cams = decompose(self.reflector, self.eye, many, index=self.index, resolution=self.resolution or 64)
+            cams = self._cut(many, 1)
             return cams, None, self._angle(cams)
 
         return self._once("decomposed", many, make)
 
     def fitted(self, many: int) -> Candidate:
-        start = self.decomposed(many).camera
+        return self._once("fitted", many, lambda: self._fit(self.decomposed(many).camera))
 
-        def make() -> tuple[CameraTriangles, Fit, float]:
-            found = fit(start, reflector=self.reflector, eye=self.eye, **self.settings)
-            return found.camera, found, 1e-3 * found.error.angle_rms
+    def curved(self, many: int) -> Candidate:
+        return self._once("curved", many, lambda: self._fit(self._cut(many, 2)))
 
-        return self._once("fitted", many, make)
+    def _cut(self, many: int, degree: int) -> CameraTriangles:
+        settings: dict[str, Any] = {"index": self.index, "resolution": self.resolution or 64, "degree": degree}
+        return decompose(self.reflector, self.eye, many, **settings)
+
+    def _fit(self, start: CameraTriangles) -> tuple[CameraTriangles, Fit, float]:
+        found = fit(start, reflector=self.reflector, eye=self.eye, **self.settings)
+        return found.camera, found, 1e-3 * found.error.angle_rms
 
     def within(self, max_angle: float) -> list[Candidate]:
-        """The fewest decomposed ones within an angle, and the fewest fitted ones; those that fall short if none do."""
+        """The fewest within an angle, decomposed, fitted and curved. Raises InputError where no number is enough."""
         what = f"max_angle={max_angle:g}"
 
         def angle(one: Candidate) -> float:
             return one.angle
 
         tried: list[Candidate] = []
-        for make, largest, below in ((self.decomposed, MOST, True), (self.fitted, LARGEST_FIT, False)):
-            start = 104 if not tried else max(round(tried[0].camera.count / _GAIN), 4)
+        problem: InputError | None = None
+        for make, largest in ((self.decomposed, MOST), (self.fitted, LARGEST_FIT), (self.curved, LARGEST_FIT)):
+            start = 104 if not tried else max(round(tried[-1].camera.count / _GAIN), 4)
             try:
-                tried.append(fewest(make, angle, max_angle, start, largest, what, below=below))
-            except InputError:
-                if make == self.fitted and not tried:
-                    raise
+                tried.append(fewest(make, angle, max_angle, start, largest, what, below=largest == MOST))
+            except InputError as error:
+                problem = error
+        if not tried and problem is not None:
+            raise problem
         return tried
 
     def in_time(self, found: list[Candidate], most: float, time_of: FrameTime) -> list[Candidate]:
-        """With the largest decomposition in time fitted too."""
+        """With the largest decomposition in time fitted, too."""
         early = [one for one in found if one.frame is not None and one.frame <= most]
         if not early:
             fastest = min(one.frame for one in found if one.frame is not None)
@@ -201,8 +210,9 @@ class _Search:
                 f"frame_time={most:g}: the fastest of these takes {fastest:.3g} s: allow more, or a smaller picture"
             )
         many = max(number for (kind, number), one in self.made.items() if any(one.camera is e.camera for e in early))
-        best = self.fitted(many)
-        return [*found, dataclasses.replace(best, frame=time_of([best.camera])[0])]
+        more = [self.fitted(many), self.curved(many)]
+        times = time_of([one.camera for one in more])
+        return [*found, *(dataclasses.replace(one, frame=seconds) for one, seconds in zip(more, times, strict=True))]
 
     def single(self) -> tuple[GeneralLinearFit | None, float]:
         """The general linear camera nearest to the true rays, and how far its rays are off them, radians."""
@@ -236,7 +246,7 @@ def sides_seen(cams: CameraTriangles, camera: Camera) -> np.ndarray:
     far away or seen at a grazing angle needs few. Slivers, which would waste most of them, have fewer along.
     """
     world = in_world(cams)
-    found = camera.project(world.vertices[world.faces].reshape(-1, 3))
+    found = camera.project(world.vertices[world.faces[:, :3]].reshape(-1, 3))
     pixel = np.asarray(found.pixel)[:, 0].reshape(-1, 3, 2)
     known = np.asarray(found.valid)[:, 0].reshape(-1, 3).all(axis=1)
     legs = [np.linalg.norm(pixel[:, j] - pixel[:, i], axis=-1) for i, j in ((0, 1), (0, 2), (1, 2))]
