@@ -48,16 +48,17 @@ class _Parts(NamedTuple):
     come: np.ndarray | None
 
     def chosen(self, which: np.ndarray) -> "_Parts":
-        return _Parts(*(None if values is None else values[..., which] for values in self))
+        cut: list[Any] = [None if values is None else values[..., which] for values in self]
+        return _Parts(*cut)
 
     def in_four(self) -> "_Parts":
         middles = np.tensordot(np.array(_MIDDLES), self.corners, 1)
         corners = np.concatenate([middles[list(one)] for one in _FOUR], axis=-1)
-        cut = [
+        cut: list[Any] = [
             None if values is None else np.concatenate([np.tensordot(part, values, 1) for part in _cuts()], axis=-1)
             for values in (self.p, self.along, self.come)
         ]
-        return _Parts(np.tile(self.number, 4), corners, *cut)  # pyright: ignore[reportArgumentType]
+        return _Parts(np.tile(self.number, 4), corners, *cut)
 
 
 def starts(places: Sequence[np.ndarray], along: Sequence[np.ndarray], points: np.ndarray, eye: Any = None) -> Starts:
@@ -97,7 +98,7 @@ def _searched(parts: _Parts, far: np.ndarray) -> Starts:
         f = np.stack([f, _product(p[2], d[0], degree) - _product(p[0], d[2], degree)])
         largest = np.sqrt((parts.p**2).sum(axis=1)).max(axis=0) + far[parts.number]
         doubt = 64 * _EPS * largest * np.sqrt((ways * ways).sum(axis=1)).max(axis=0)
-        toward = sum(_product(parts.p[:, k], ways[:, k], degree) for k in range(3))
+        toward = _inner(parts.p, ways, degree)
         alive = (toward.min(axis=0) <= doubt) & ~_one_sign(f, doubt).any(axis=0)
         x, y = _derivatives(f, degree + 2)
         mx, my = x.mean(axis=1), y.mean(axis=1)
@@ -148,11 +149,16 @@ def _directions(parts: _Parts) -> np.ndarray:
     if parts.come is None:
         return parts.along
     normal, come = parts.along, parts.come
-    square = sum(_product(normal[:, k], normal[:, k], 2) for k in range(3))
-    across = sum(_product(come[:, k], normal[:, k], 2) for k in range(3))
+    square, across = _inner(normal, normal, 2), _inner(come, normal, 2)
     return np.stack(
         [_product(come[:, k], square, 4) - 2.0 * _product(normal[:, k], across, 4) for k in range(3)], axis=1
     )
+
+
+def _inner(f: np.ndarray, g: np.ndarray, degree: int) -> np.ndarray:
+    """Coefficients of the inner product of vectors of polynomials, (6, 3, M) and (K, 3, M)."""
+    x, y, z = (_product(f[:, k], g[:, k], degree) for k in range(3))
+    return x + y + z
 
 
 def _product(f: np.ndarray, g: np.ndarray, degree: int) -> np.ndarray:

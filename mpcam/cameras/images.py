@@ -148,11 +148,10 @@ def _searched(*numbers: Any, bends: str) -> list[tuple[Any, Any, Any, Any]]:
     given = [np.asarray(part, np.float64) for part in numbers]
     places, rays, point = given[:18], given[18:36], np.stack(np.broadcast_arrays(*given[36:39]))
     shape = np.broadcast_shapes(*(part.shape for part in given))
-    wide = [
-        tuple(np.stack([np.broadcast_to(x, shape) for x in part[k : k + 3]]) for k in range(0, 18, 3))
-        for part in (places, rays)
-    ]
-    eye = None if bends == "direct" else np.array([float(part.ravel()[0]) for part in given[39:42]])
+    wide: list[Any] = []
+    for table in (places, rays):
+        wide.append(tuple(np.stack([np.broadcast_to(x, shape) for x in table[k : k + 3]]) for k in range(0, 18, 3)))
+    eye: Any = None if bends == "direct" else np.array([float(part.ravel()[0]) for part in given[39:42]])
 
     def bend(origin: Any, along: Any) -> Any:
         if bends == "direct":
@@ -165,9 +164,10 @@ def _searched(*numbers: Any, bends: str) -> list[tuple[Any, Any, Any, Any]]:
 
     with np.errstate(all="ignore"):
         if bends != "refraction":
-            return curved_images.project(bend, *wide, point, eye)
-        found = bent_rays.project(bend, *wide, point)
-    nothing = (*(np.zeros(shape) for _ in range(3)), np.zeros(shape, bool))
+            return curved_images.project(bend, wide[0], wide[1], point, eye)
+        found = bent_rays.project(bend, wide[0], wide[1], point)
+    zero = np.zeros(shape)
+    nothing = zero, zero, zero, np.zeros(shape, bool)
     return [*found, *[nothing] * (curved_images.IMAGES - len(found))]
 
 
