@@ -30,8 +30,8 @@ TURN = 60.0
 """Degrees by which the two views from aside are turned around the statue."""
 NEAR = 0.99
 """Pixels of less true exposure than this count: elsewhere nothing is to be found out."""
-SAME_POINT = 0.08
-"""Scene units by which a point may be off what the four pixels around it see, for it to be seen there."""
+SAME_POINT = 5.0
+"""Widths of a pixel by which a point may be off what the four pixels around it see, for it to be seen there."""
 HELD = 0.06
 """Scene units off a z-buffer's depth within which it holds a point: backs of thin limbs count with their fronts."""
 EVERY = 7
@@ -184,11 +184,13 @@ class Flicker:
         seen = (place >= 0).all(-1) & (place < size - 1).all(-1)
         first = np.clip(np.floor(place), 0, size - 2).astype(int)
         part = np.clip(place - first, 0, 1)
+        eye = np.linalg.inv(np.asarray(camera.camera_from_world))[:3, 3]
+        limit = SAME_POINT / camera.fx * np.linalg.norm(self.points - eye, axis=-1)
         corners = []
         for right, below in ((0, 0), (1, 0), (0, 1), (1, 1)):
             column, row = first[:, 0] + right, first[:, 1] + below
             weight = np.where(right, part[:, 0], 1 - part[:, 0]) * np.where(below, part[:, 1], 1 - part[:, 1])
-            near = np.linalg.norm(hits.points[row, column] - self.points, axis=-1) < SAME_POINT
+            near = np.linalg.norm(hits.points[row, column] - self.points, axis=-1) < limit
             seen &= hits.mask[row, column] & near
             corners.append((row, column, weight))
         for key, exposure in found.items():
