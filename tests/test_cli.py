@@ -47,7 +47,7 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("frobnicate", "compare, render, decompose, caustics, surround, project"),
+        ("frobnicate", "compare, render, decompose, fit, caustics, surround, project"),
         ("render", "SCENE"),
         ("render cube", "--output"),
         ("render cube --output a.png --frobnicate", "--frobnicate"),

@@ -162,7 +162,12 @@ class Weighted:
     """A part whose rays are one or several for each pixel, one set after the other: their sum, with weights (N, 3)."""
 
     def __init__(self, part: MirrorPart, weights: Sequence[np.ndarray]):
-        self.part, self.stages = part, part.stages
+        import drjit as dr
+
+        from mpcam_kernels.threads import threads
+
+        self.part, self.stages, count = part, part.stages, len(weights[0])
+        self._pixels = threads(types(), 0, count), dr.opaque(types().UInt, count)
         self._weights = [
             types().Array3f(*(types().Float(aligned(part)) for part in w.T)) + opaque_zero() for w in weights
         ]
@@ -171,20 +176,19 @@ class Weighted:
         self.part.move(mesh)
 
     def colors(self) -> list[Any]:
-        return list(_sum()(self.part.colors(), self._weights))
+        return list(_sum()(*self._pixels, self.part.colors(), self._weights))
 
 
 @functools.cache
 def _sum() -> Any:
+    """Kernel for any number of pixels: it comes in, since what a kernel counts itself is kept from the first call."""
     import drjit as dr
 
     from mpcam_kernels.frozen import frozen
 
     @frozen
-    def kernel(colors: list[Any], weights: list[Any]) -> Any:
-        t = types()
-        count = dr.width(weights[0])
-        pixel, result = dr.arange(t.UInt, count), t.Array3f(0.0)
+    def kernel(pixel: Any, count: Any, colors: list[Any], weights: list[Any]) -> Any:
+        t, result = types(), types().Array3f(0.0)
         for number, weight in enumerate(weights):
             result += weight * t.Array3f(*(dr.gather(t.Float, part, pixel + number * count) for part in colors))
         return result
