@@ -99,21 +99,19 @@ def _shown(shape: str, scene: Scene, quick: bool, steps: StepCounter) -> tuple[R
 def enough(rows: Rows, mirror: str, measure: str = "flip") -> float:
     """How many fitted camera triangles, for each decomposed one, give a picture as good: at most, over all numbers.
 
-    Fitted numbers in between are interpolated, both logarithmic. Left out are the fewest, below which nothing was
-    fitted, and pictures that are as good as they get, where pixels and no longer rays decide; NaN if all are.
+    Of the numbers that were tried. Left out are the fewest, below which nothing was fitted, and pictures that are as
+    good as they get, where pixels and no longer rays decide; NaN if all are.
     """
     by = {
         kind: [row for row in rows if row["mirror"] == mirror and row["kind"] == kind] for kind in (DECOMPOSED, FITTED)
     }
     sign, room = (-1.0, 0.5) if measure == "psnr" else (1.0, 0.1 * min(row[measure] for row in by[FITTED]))
-    numbers = np.log([row["triangles"] for row in by[FITTED]])
-    errors = np.array([sign * row[measure] for row in by[FITTED]])
-    order = np.argsort(errors)
+    errors = {row["triangles"]: sign * row[measure] for row in by[FITTED]}
     found = []
     for row in by[DECOMPOSED]:
-        if row["triangles"] > min(one["triangles"] for one in by[FITTED]) and sign * row[measure] > errors.min() + room:
-            same = np.exp(np.interp(sign * row[measure], errors[order], numbers[order]))
-            found.append(float(same) / row["triangles"])
+        here = sign * row[measure]
+        if row["triangles"] > min(errors) and here > min(errors.values()) + room:
+            found.append(min(number for number, error in errors.items() if error <= here) / row["triangles"])
     return max(found, default=np.nan)
 
 
@@ -124,8 +122,8 @@ def _reading(rows: Rows) -> str:
         said.append(f"{mirror}: {parts}")
     return (
         "So many fitted camera triangles, for each decomposed one, give a picture as good, at worst over the numbers "
-        f"at which rays decide: {'; '.join(said)}. The pixels of the atlas limit all pictures in the end. Frames take as "
-        "long with fitted ones."
+        f"at which rays decide: {'; '.join(said)}. The pixels of the atlas limit all pictures in the end. Frames take "
+        "as long with fitted ones."
     )
 
 
