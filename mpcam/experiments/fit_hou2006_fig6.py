@@ -99,19 +99,22 @@ def _shown(shape: str, scene: Scene, quick: bool, steps: StepCounter) -> tuple[R
 def enough(rows: Rows, mirror: str, measure: str = "flip") -> float:
     """How many fitted camera triangles, for each decomposed one, give a picture as good: at most, over all numbers.
 
-    Of the numbers that were tried. Left out are the fewest, below which nothing was fitted, and pictures that are as
-    good as they get, where pixels and no longer rays decide; NaN if all are.
+    Numbers between those that were tried are interpolated, both logarithmic; where more of them did no better, the
+    fewer count. Left out are the fewest, below which nothing was fitted, and pictures that are as good as they get,
+    where pixels and no longer rays decide; NaN if all are.
     """
     by = {
         kind: [row for row in rows if row["mirror"] == mirror and row["kind"] == kind] for kind in (DECOMPOSED, FITTED)
     }
     sign, room = (-1.0, 0.5) if measure == "psnr" else (1.0, 0.1 * min(row[measure] for row in by[FITTED]))
-    errors = {row["triangles"]: sign * row[measure] for row in by[FITTED]}
+    tried = np.array([row["triangles"] for row in by[FITTED]], float)
+    errors = np.minimum.accumulate([sign * row[measure] for row in by[FITTED]])
     found = []
     for row in by[DECOMPOSED]:
         here = sign * row[measure]
-        if row["triangles"] > min(errors) and here > min(errors.values()) + room:
-            found.append(min(number for number, error in errors.items() if error <= here) / row["triangles"])
+        if row["triangles"] > tried[0] and here > errors[-1] + room:
+            same = np.exp(np.interp(here, errors[::-1], np.log(tried[::-1])))
+            found.append(float(same) / row["triangles"])
     return max(found, default=np.nan)
 
 
