@@ -137,7 +137,7 @@ def test_a_statue_is_near_to_traced():
         assert (exposure[~hits.mask] == 1.0).all()
         again = mp.screen_occlusion(hits, 0.6, directions=directions, steps=steps, blur=5)
         np.testing.assert_array_equal(exposure, again)
-        on_device = screen_occlusion_device(hits, 0.6, directions=directions, steps=steps, blur=5)
+        on_device = screen_occlusion_device(hits, mp.Occlusion(0.6, directions=directions, steps=steps, blur=5))
         np.testing.assert_array_equal(np.asarray(on_device.numpy()).reshape(90, 120), exposure)
 
 

@@ -60,25 +60,17 @@ def screen_occlusion(
     What no z-buffer holds covers nothing. The exposure is by solid angle, as `ambient_occlusion(weight="uniform")`,
     which is exact, and slow.
     """
-    settings: dict[str, Any] = {"directions": directions, "steps": steps, "falloff": falloff, "bias": bias}
-    exposure = screen_occlusion_device(
-        hits, radius, blur=blur, zbuffer=zbuffer, thickness=thickness, backs=backs, **settings
-    )
+    occlusion = Occlusion(radius, thickness, directions, steps, falloff, bias, blur)
+    exposure = screen_occlusion_device(hits, occlusion, zbuffer=zbuffer, backs=backs)
     return np.asarray(exposure.numpy()).reshape(hits.camera.height, hits.camera.width)
 
 
 @exclusive
 def screen_occlusion_device(
     hits: Hits,
-    radius: float,
+    occlusion: Occlusion,
     *,
-    directions: int = 6,
-    steps: int = 6,
-    falloff: str = "quadratic",
-    bias: float = 0.05,
-    blur: int = 21,
     zbuffer: Hits | Sequence[Hits] | None = None,
-    thickness: float | None = None,
     backs: Hits | Sequence[Hits] | None = None,
 ) -> Any:
     """As `screen_occlusion`, but it stays on the device: an evaluated Float, one entry per pixel."""
@@ -88,21 +80,22 @@ def screen_occlusion_device(
     if not isinstance(hits, Hits):
         raise InputError(f"hits is a {type(hits).__name__}: give hits, mpcam.rasterize(pinhole, scene)")
     camera = check_screen(hits.camera)
-    given = Occlusion(radius, thickness, directions, steps, falloff, bias, blur)
-    lines, length, window = (directions, steps), float(radius), blur
-    back, buffers = given.thickness, _checked_buffers(hits, zbuffer, thickness)
+    lines, window, falloff = (occlusion.directions, occlusion.steps), occlusion.blur, occlusion.falloff
+    back, buffers = occlusion.thickness, _checked_buffers(hits, zbuffer, occlusion.thickness)
     count = camera.width * camera.height
     if hits.mesh.triangle_count == 0:
         return dr.ones(t.Float, count)
     device = device_mesh(hits.mesh)
-    length = min(length / device.scale, _UNBOUND)
+    length = min(float(occlusion.radius) / device.scale, _UNBOUND)
     pose = np.asarray(camera.camera_from_world, np.float64)[:3, :3]
     data = {
         "faces": device.faces,
         "vertices": device.vertices,
         "pose": opaque_numbers([*pose.ravel()]),
         "camera": opaque_numbers([camera.fx, camera.fy, camera.cx, camera.cy, 1.0 / device.scale]),
-        "numbers": opaque_numbers([length, math.sin(bias), _THICKNESS * length, (back or 0.0) / device.scale]),
+        "numbers": opaque_numbers(
+            [length, math.sin(occlusion.bias), _THICKNESS * length, (back or 0.0) / device.scale]
+        ),
     }
     size = (camera.width, camera.height)
     surface = _surfaces(size)(hits.device_triangle, hits.device_depth, data)

@@ -36,6 +36,7 @@ from mpcam.experiments.rosen2011_occlusion_path import (
 from mpcam.experiments.rosen2011_paper import CARD, OCCLUSION_MS, PAPER
 from mpcam.experiments.rosen2011_scenes import statue_scene
 from mpcam.pictures.render import render
+from mpcam.scene.occlusion import Occlusion
 from mpcam.scene.scene import Scene
 
 ROUNDS = 7
@@ -155,7 +156,9 @@ def _calls(views: Views, scene: Scene, blur: int) -> dict[str, Callable[[], obje
     for setting in OCCLUSION_MS:
         for label, way in WAYS.items():
             given = settings_of(way, seen, setting, blur)
-            calls[f"{setting} {label}"] = partial(screen_occlusion_device, seen.fronts[OUTPUT], RADIUS, **given)
+            buffers = {name: given.pop(name, None) for name in ("zbuffer", "backs")}
+            occlusion = Occlusion(RADIUS, **given)
+            calls[f"{setting} {label}"] = partial(screen_occlusion_device, seen.fronts[OUTPUT], occlusion, **buffers)
     return calls
 
 

@@ -1,7 +1,6 @@
 """`render`: an image of a scene, with or without a mirror, by any method."""
 
 import sys
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -96,7 +95,7 @@ def image_and_depth(
         picture = ReliefPicture(whole, camera, method, shading=shading, shadows=maps, **settings)
         return picture.image(), picture.depth() if depth else None
     hits = rasterize(camera, whole.mesh, method, **settings)
-    exposure = None if occlusion is None else screen_occlusion_device(hits, **asdict(occlusion))
+    exposure = None if occlusion is None else screen_occlusion_device(hits, occlusion)
     return shade(hits, whole, shading, maps, exposure), hits.depth if depth else None
 
 
