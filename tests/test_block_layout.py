@@ -33,3 +33,16 @@ def test_runs_and_parts_are_those_that_hold_pixels(name):
 
 def test_an_image_has_a_run_for_every_eight_pixels_where_blocks_fit():
     assert len(image_layout(64, 32).runs) == 64 * 32 // RUN
+
+
+@pytest.mark.parametrize("name", ["even", "odd", "layers"])
+def test_slots_are_where_their_pixels_are(name):
+    """Blocks of 16 x 8, in each eight parts of 4 x 4, row by row: found from the slot, not from the pixel."""
+    layout, width = layouts()[name], 64 if name == "even" else 45
+    slots = layout.slots[layout.slots >= 0]
+    pixel = np.flatnonzero(layout.slots >= 0) % layout.pixels
+    block, part, rest = slots // BLOCK, slots % BLOCK // PART, slots % PART
+    np.testing.assert_array_equal(layout.x[block] + part % 4 * 4 + rest % 4, pixel % width)
+    np.testing.assert_array_equal(layout.y[block] + part // 4 * 4 + rest // 4, pixel // width)
+    np.testing.assert_array_equal(layout.face[block], np.flatnonzero(layout.slots >= 0) // layout.pixels)
+    assert len(np.unique(slots)) == len(slots)
