@@ -46,3 +46,15 @@ def test_slots_are_where_their_pixels_are(name):
     np.testing.assert_array_equal(layout.y[block] + part // 4 * 4 + rest // 4, pixel // width)
     np.testing.assert_array_equal(layout.face[block], np.flatnonzero(layout.slots >= 0) // layout.pixels)
     assert len(np.unique(slots)) == len(slots)
+
+
+def test_slots_of_camera_triangles_are_where_their_pixels_are():
+    known = atlas((35, 7, 35, 2))
+    layout, (face, column, row) = atlas_layout(known), known.places
+    there = face >= 0
+    np.testing.assert_array_equal(layout.slots >= 0, there)
+    slots = layout.slots[there]
+    block, part, rest = slots // BLOCK, slots % BLOCK // PART, slots % PART
+    np.testing.assert_array_equal(layout.face[block], face[there])
+    np.testing.assert_array_equal(layout.x[block] + part % 4 * 4 + rest % 4, column[there])
+    np.testing.assert_array_equal(layout.y[block] + part // 4 * 4 + rest // 4, row[there])

@@ -8,7 +8,7 @@ import pytest
 import mpcam as mp
 from mpcam.cli import main
 from mpcam.cli_common import angle
-from mpcam.decomposition.fewest import fewest
+from mpcam.decomposition.fewest import Limit, fewest, fewest_within
 from mpcam.decomposition.reflector import reflector_of
 from mpcam.errors import InputError
 
@@ -64,6 +64,16 @@ def test_no_number_of_a_scan_is_much_smaller(name, most):
     for count in np.linspace(0.75, 0.9, 6) * cams.count:
         fewer = mp.decompose(shape, EYE, round(count))
         assert mp.ray_error(fewer, shape, EYE, samples=13_577).angle_rms > 0.98e3 * most
+
+
+@pytest.mark.parametrize("name", ["max_angle", "max_error"])
+def test_the_limit_is_that_of_ray_error_and_may_be_met_exactly(name):
+    cams = mp.decompose(BALL, EYE, 20)
+    found = mp.ray_error(cams, BALL, EYE)
+    most = 1e-3 * found.angle_rms if name == "max_angle" else found.rms
+    assert fewest_within(lambda count: cams, Limit(name, most), reflector_of(BALL), EYE, 104) is cams
+    with pytest.raises(InputError, match=f"{name}=.* is not reached: 104 camera triangles"):
+        fewest_within(lambda count: cams, Limit(name, 0.9999 * most), reflector_of(BALL), EYE, 104)
 
 
 def test_errors_may_be_distances_and_rays_directions():
