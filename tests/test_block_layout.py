@@ -46,6 +46,17 @@ def test_slots_are_where_their_pixels_are(name):
     np.testing.assert_array_equal(layout.y[block] + part // 4 * 4 + rest // 4, pixel // width)
     np.testing.assert_array_equal(layout.face[block], np.flatnonzero(layout.slots >= 0) // layout.pixels)
     assert len(np.unique(slots)) == len(slots)
+    assert layout.slots.min() >= -1 and slots.max() < layout.blocks * BLOCK
+    if name == "layers":
+        assert np.count_nonzero(layout.slots[: layout.pixels] >= 0) > 3
+        assert np.count_nonzero(layout.slots[layout.pixels :] >= 0) == 3
+        assert (np.diff(layout.group) >= 0).all() and layout.groups == len(np.unique(layout.group))
+
+
+def test_without_pixels_there_is_one_empty_block():
+    layout = layouts()["nothing"]
+    assert (layout.blocks, layout.groups, layout.pixels) == (1, 1, 45 * 19)
+    assert (layout.slots == -1).all() and len(layout.slots) == 45 * 19
 
 
 def test_slots_of_camera_triangles_are_where_their_pixels_are():
